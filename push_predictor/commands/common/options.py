@@ -9,11 +9,13 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from push_predictor.commands.common.command import Group, Option, Output
 from push_predictor.commands.common.output import check_data, warn
 from push_predictor.errors import RequestError
+from push_predictor.recordings import topic_settings
+from push_predictor.recordings.topic_settings import Setting
 
 if TYPE_CHECKING:
     from push_predictor.recordings.rig import Rig
@@ -65,13 +67,20 @@ COVARIATE = Option(
     help="a covariate that an extended model needs; may be repeated",
 )
 RIG = Option("--rig", type=Path, metavar="FILE.yaml", help="rig file, needed if the data contain no push_rig record")
-_STREAMS = (
-    ("slider", "slider/pose"),
-    ("pusher", "pusher/pose"),
-    ("wrench", "pusher/wrench, if there is one; none leaves a recorded wrench out"),
-)
+
+
+def _setting(setting: Setting, note: str = "", **more: Any) -> Option:
+    """The option of a setting of the topics."""
+    meaning = setting.meaning[0].lower() + setting.meaning[1:]
+    text = f"{meaning}. Default: {setting.default}{note}"
+    return Option(f"--{setting.name.replace('_', '-')}", default="", help=text, **more)
+
+
+_SLIDER, _PUSHER, _WRENCH = topic_settings.TOPICS
 _TOPICS = (
-    *(Option(f"--{name}-topic", default="", metavar="TOPIC", help=f"default: {default}") for name, default in _STREAMS),
+    _setting(_SLIDER, metavar="TOPIC"),
+    _setting(_PUSHER, metavar="TOPIC"),
+    _setting(_WRENCH, ", if there is one; none leaves a recorded wrench out", metavar="TOPIC"),
     Option(
         "--covariate-topic",
         dest="covariate_topics",
@@ -80,37 +89,11 @@ _TOPICS = (
         metavar="TOPIC",
         help="a further covariate: TOPIC or TOPIC.FIELD; may be repeated. Topics of scalar types need no option",
     ),
-    Option(
-        "--wrench-frame",
-        default="",
-        metavar="world|tip|FRAME",
-        help="axes of the wrench: the world's (default), turned with the tip's pose, or of a frame in /tf",
-    ),
-    Option(
-        "--wrench-bias",
-        default="",
-        choices=("free_motion", "none"),
-        help="subtract bias and weight of the sensor, estimated while the tip touches nothing; default: none",
-    ),
-    Option(
-        "--world-frame",
-        default="",
-        metavar="FRAME",
-        help="frame of all poses: tf turns poses of other frames into it. Default: frames in /tf are looked up in "
-        "world or the root, other poses keep their frame",
-    ),
-    Option(
-        "--stamp",
-        default="",
-        choices=("header", "log"),
-        help="time of each sample: of its header (default), or at which the recorder received it, for all streams",
-    ),
-    Option(
-        "--up",
-        default="",
-        metavar="AXIS|STREAM=AXIS",
-        help="axis of the poses' world that points up: x, y, z (default), -x, -y or -z. Of single streams: slider=y",
-    ),
+    _setting(topic_settings.WRENCH_FRAME, metavar="world|tip|FRAME"),
+    _setting(topic_settings.WRENCH_BIAS, choices=("free_motion", "none")),
+    _setting(topic_settings.WORLD_FRAME, "; of frames in /tf world, or the root", metavar="FRAME"),
+    _setting(topic_settings.STAMP, choices=("header", "log")),
+    _setting(topic_settings.UP, metavar="AXIS|STREAM=AXIS"),
 )
 _ABOUT_TOPICS = (
     "topics of recordings",
