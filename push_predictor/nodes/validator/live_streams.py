@@ -14,7 +14,7 @@ from rclpy.qos import ReliabilityPolicy
 
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.polling import FollowingSubscription, Taken
-from push_predictor.nodes.qos import DEEPEST, message_class
+from push_predictor.nodes.qos import message_class
 from push_predictor.online.stream_health import TopicReport, stamp_figures
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.messages import Messages
@@ -40,10 +40,8 @@ class TopicStream:
 
     def __init__(self, node: Node, stream: str, own: TopicInput) -> None:
         self.own, self._stream, self._is_sensor = own, stream, stream in STREAMS
-        topic, first, earlier = own.source.topic, "" if own.source.field else own.target.type, not self._is_sensor
-        self.subscription = FollowingSubscription(
-            node, topic, self._unfit, DEEPEST, first=first, earlier=earlier, overridable=not earlier
-        )
+        topic, first = own.source.topic, "" if own.source.field else own.target.type
+        self.subscription = FollowingSubscription(node, topic, self._unfit, first=first, live=self._is_sensor)
         self.name = self.subscription.name + own.source.text[len(topic) :]  # after remapping, for people
         self._known: dict[str, str] = {}  # why a type does not fit, '' if it does
 
@@ -114,10 +112,8 @@ class TransformTopics:
 
     def __init__(self, node: Node, topic: str, buffer: TransformBuffer) -> None:
         self.buffer = buffer
-        self.moving = FollowingSubscription(
-            node, topic, _no_tf, DEEPEST, first=TF_TYPE, earlier=False, overridable=True
-        )
-        self._static = FollowingSubscription(node, topic + STATIC, _no_tf, DEEPEST, first=TF_TYPE)
+        self.moving = FollowingSubscription(node, topic, _no_tf, first=TF_TYPE, live=True)
+        self._static = FollowingSubscription(node, topic + STATIC, _no_tf, first=TF_TYPE)
 
     @property
     def lost(self) -> int:

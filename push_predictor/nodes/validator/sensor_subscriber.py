@@ -9,17 +9,15 @@ import threading
 from dataclasses import replace
 from time import monotonic
 
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
-from rclpy.validate_topic_name import validate_topic_name
 
-from push_predictor.errors import RequestError
+from push_predictor.nodes.polling import check_sources
 from push_predictor.nodes.validator.live_streams import FrameStream, TopicStream, TransformTopics
 from push_predictor.nodes.validator.scalar_topics import ClockTopic, ScalarTopic
 from push_predictor.online.stream_health import TopicReport
-from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of, name_of
+from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of
 from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
-from push_predictor.recordings.decoder.sources import COVARIATE, STREAMS, sources_of
+from push_predictor.recordings.decoder.sources import STREAMS
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
 from push_predictor.recordings.fields.transforms import WORLD
@@ -206,20 +204,3 @@ class SensorSubscriber:
         if wrench.bias is not None and wrench.estimate is not None and wrench.bias.problem:
             return [f"The bias of the wrench is kept as first estimated: {wrench.bias.problem}."]
         return [UNKNOWN_BIAS] if wrench.waits_for_bias else []
-
-
-def check_sources(topics: Topics) -> None:
-    """Raise RequestError that names the parameter, its value and what is accepted, for names that are not valid."""
-    scalars: set[str] = set()
-    for name, source in sources_of(topics):
-        frame = ", or a frame as in /tf:tool0" if name not in ("wrench", COVARIATE) else ""
-        accepted = f"a topic, or a topic and a field as in /odom.pose.pose{frame}"
-        try:
-            validate_topic_name(source.topic)
-        except InvalidTopicNameException as error:
-            raise RequestError(source.key, source.text, f"{accepted} ({' '.join(str(error).split())})") from None
-        if source.topic.startswith("~") or source.text.endswith(".") or not source.frame_fits(bool(frame)):
-            raise RequestError(source.key, source.text, accepted)
-        if name == COVARIATE and name_of(source) in scalars:
-            raise RequestError(source.key, source.text, "each topic or field once")
-        scalars |= {name_of(source)} if name == COVARIATE else set()
