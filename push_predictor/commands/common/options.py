@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from push_predictor.recordings import topic_settings
 from push_predictor.recordings.topic_settings import Setting
 
 if TYPE_CHECKING:
+    from push_predictor.recordings.checks.check import DataChecks
     from push_predictor.recordings.rig import Rig
     from push_predictor.recordings.topics import Topics
 
@@ -120,11 +122,16 @@ class Reading:
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
+        self.rig, self.topics = given_rig(options), topics_of(options)
+        self._strict: bool = getattr(options, "strict", False)
+        self._saves: bool = options.save_topics
+
+    @cached_property
+    def checks(self) -> DataChecks:
+        """See the class."""
         from push_predictor.recordings.checks.check import DataChecks
 
-        self.rig, self.topics = given_rig(options), topics_of(options)
-        self.checks = DataChecks(getattr(options, "strict", False), warn)
-        self._saves: bool = options.save_topics
+        return DataChecks(self._strict, warn)
 
     def save_topics(self, paths: Sequence[Path]) -> None:
         """Save the topics next to the recordings among the paths, if --save-topics asks for it, once all are read.

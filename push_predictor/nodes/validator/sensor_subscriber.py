@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from dataclasses import replace
 from time import monotonic
+from typing import TypeAlias
 
 from rclpy.node import Node
 
@@ -16,7 +17,7 @@ from push_predictor.nodes.validator.live_streams import FrameStream, TopicStream
 from push_predictor.nodes.validator.scalar_topics import ClockTopic, ScalarTopic
 from push_predictor.online.stream_health import TopicReport
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of
-from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
+from push_predictor.recordings.decoder.poses import PoseFrame
 from push_predictor.recordings.decoder.sources import STREAMS
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
@@ -27,6 +28,8 @@ from push_predictor.recordings.topics import TIP_AXES, WORLD_AXES, Topics
 PERIOD = 0.01  # s between two looks into the middleware, which keeps the last messages only
 LOOK = 0.05  # s between two looks at the publishers
 PATIENCE = 1.0  # s that a run waits for the first message of every topic
+
+Stream: TypeAlias = FrameStream | TopicStream
 
 
 class SensorSubscriber:
@@ -41,22 +44,23 @@ class SensorSubscriber:
         self._error = node.get_logger().error
         self.decoder = decoder = StreamDecoder(topics, expected=WORLD)
         self._tf = {name: TransformTopics(node, f"/{name}", buffer) for name, buffer in decoder.tf.items()}
-        self._sensors: dict[str, FrameStream | TopicStream] = {
-            name: FrameStream(node, name, pose, self._tf[key_of(pose.source.topic)])
+        sensors: list[Stream] = [
+            FrameStream(node, name, pose, self._tf[key_of(pose.source.topic)])
             if isinstance(pose, PoseFrame)
             else TopicStream(node, name, pose.messages)
             for name, pose in decoder.poses.items()
-        }
-        self._sensors["wrench"] = TopicStream(node, "wrench", decoder.wrench.messages)
+        ]
+        sensors.append(TopicStream(node, "wrench", decoder.wrench.messages))
         clock = ClockTopic(node)
         self._scalars = [ScalarTopic(node, name, own, clock.history) for name, own in decoder.scalars.items()]
-        topics_of_sensors = [stream for stream in self._sensors.values() if isinstance(stream, TopicStream)]
-        self._subscribed: list[TopicStream | TransformTopics | ClockTopic] = [*self._scalars, *topics_of_sensors]
+        self._streams = [*sensors, *self._scalars]
+        self._subscribed: list[TopicStream | TransformTopics | ClockTopic] = [*self._scalars]
+        self._subscribed += [stream for stream in sensors if isinstance(stream, TopicStream)]
         self._subscribed += [*self._tf.values(), *([clock] if self._scalars else [])]
-        self._reports: dict[str, TopicReport] = {}
+        self._reports: dict[Stream, TopicReport] = {}
         self._empty = monotonic()  # when nothing waited last
-        of_topics = all(isinstance(pose, PoseTopic) for pose in decoder.poses.values())
-        self._settled = bool(topics.world) or of_topics  # whether the frame of poses is known from the first message
+        framed = any(isinstance(pose, PoseFrame) for pose in decoder.poses.values())
+        self._settled = bool(topics.world) or not framed  # whether the frame of poses is known from the first message
         self._looked = -LOOK
         self._draining, self._ending = threading.Lock(), threading.Event()
         self.look()
@@ -132,22 +136,16 @@ class SensorSubscriber:
                 scalar.date(last=True)
         return self.decoder.take_scalars(last=True)
 
-    def inspect(self) -> dict[str, TopicReport]:
-        """Make the reports about the topics anew, by stream."""
+    def inspect(self) -> list[TopicReport]:
+        """Make the reports about the topics anew."""
         with self._draining:
-            reports = [stream.report() for stream in self._streams]
-        self._reports = {report.stream: report for report in reports}
-        self._reports["wrench"] = self._amended(self._reports["wrench"])
-        return self._reports
-
-    @property
-    def _streams(self) -> list[FrameStream | TopicStream]:
-        return [*self._sensors.values(), *self._scalars]
+            self._reports = {stream: self._amended(stream.report()) for stream in self._streams}
+        return [*self._reports.values()]
 
     def _amended(self, report: TopicReport) -> TopicReport:
-        """The report about the wrench with what is wrong with its frame in tf; as it is without a publisher."""
+        """That about the wrench with what is wrong with its frame in tf; as it is without a publisher."""
         frame, problem = self.decoder.wrench.frame, self.decoder.wrench.problem
-        if not frame or report.problem or report.note:
+        if report.stream != "wrench" or not frame or report.problem or report.note:
             return report
         tf = next(iter(self._tf.values()))
         if tf.problem:
@@ -165,8 +163,8 @@ class SensorSubscriber:
     def figures(self) -> dict[str, object]:
         """The report about each topic, counts of its messages, and of rejected ones by the kinds that occurred."""
         found: dict[str, object] = {}
-        for (name, report), stream in zip(self._reports.items(), self._streams, strict=False):
-            own = stream.own
+        for stream, report in self._reports.items():
+            name, own = report.stream, stream.own
             found |= {f"{name} topic": report.line, f"{name} samples": own.received}
             found |= {f"{name} rejected": own.rejected.total()}
             found |= {f"{name} rejected {kind}": count for kind, count in own.rejected.items()}
@@ -184,8 +182,8 @@ class SensorSubscriber:
     def problems(self) -> list[str]:
         """What keeps pushes from being found, in words; about the topics by the last inspection."""
         found = []
-        for (name, report), stream in zip(self._reports.items(), self._streams, strict=False):
-            own, topic = stream.own, report.topic
+        for stream, report in self._reports.items():
+            name, own, topic = report.stream, stream.own, report.topic
             if report.problem:
                 found.append(f"{topic}: {report.problem}")
             if own.rejected:

@@ -62,7 +62,7 @@ class StatusPublisher:
     def _log_topics(self) -> None:
         """Log a line for each topic of which something has changed."""
         log = self._node.get_logger()
-        reports = self._sensors.inspect()
+        reports = {report.stream: report for report in self._sensors.inspect()}
         for stream in self._topic_news.of({stream: report.key for stream, report in reports.items()}):
             report = reports[stream]
             if report.refused:  # one line each: rclpy binds the severity to the place of the call
