@@ -80,3 +80,5 @@ def test_a_change_that_stays_is_news_once() -> None:
     assert told(replace(faster, figures="101.0 Hz")) == [[]], "figures alone are no change"
     for other in (replace(faster, problem="No publisher."), replace(faster, reliability="reliable")):
         assert told(other, other, other) == [[], ["slider"], []]
+    at_once = News(at_once=True)
+    assert [at_once.of(dict.fromkeys(present, "")) for present in ("a", "ab", "", "a")] == [["a"], ["b"], [], ["a"]]

@@ -44,7 +44,7 @@ class StatusPublisher:
         self._node, self._session, self._writer = node, session, writer
         self._models, self._rigs, self._sensors, self._client = models, rigs, sensors, client
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._news, self._topic_news = News(), News()
+        self._news, self._topic_news = News(at_once=True), News()
 
     def publish(self, run: ValidationRun | None) -> None:
         """Publish the status of this moment. run: the present one or the last."""
