@@ -20,7 +20,6 @@ from importlib import import_module
 from push_predictor import __version__
 from push_predictor.blas_threads import limit_process
 from push_predictor.commands.common.options import with_signed_axes
-from push_predictor.commands.common.output import check_json
 from push_predictor.errors import PushPredictorError
 
 LONGEST_FAULT = 500  # characters of an error's text
@@ -54,7 +53,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _complete(parser)
     options = parser.parse_args(words)
     try:
-        check_json(options)
         options.run(options)
         sys.stdout.flush()  # report a full disk here, not when the interpreter exits
     except BrokenPipeError:  # the reader closed the pipe, as `| head` does
@@ -83,7 +81,7 @@ def build_parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"push_predictor {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in names:
-        import_module(f"push_predictor.commands.{name}_command").add_parser(commands)
+        import_module(f"push_predictor.commands.{name}_command").run.add_to(commands)
     return parser
 
 

@@ -3,5 +3,6 @@
 
 """The sub-commands of the command line, one module each.
 
-Each module has `add_parser`. It imports numpy, scipy and ROS only when its command runs, so that --help is fast.
+Each module has `run`, with `add_to` for its parser. It imports numpy, scipy and ROS only when its command runs, so
+that --help is fast.
 """

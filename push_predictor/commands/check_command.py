@@ -8,36 +8,29 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.options import Reading, add_command, add_data, add_reading
-from push_predictor.commands.common.output import check_data, check_output, write_json
+from push_predictor.commands.common.command import Output, command
+from push_predictor.commands.common.options import READING, Reading, data_argument
+from push_predictor.commands.common.output import write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RecordingError
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `check`."""
-    parser = add_command(
-        commands,
-        "check",
-        "Find mistakes in recordings and push tables before training. Checks units, topics, frames, the outline, "
-        "clocks and the wrench, and which sides, speeds and angles were pushed. Estimates each correction with its "
-        "standard deviation.",
-        "push_predictor check bags/square_abs_train",
-    )
-    add_data(parser)
-    parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a page: tracks, contacts, coverage")
-    add_reading(parser)
-    parser.set_defaults(run=run)
-
-
+@command(
+    "check",
+    "Find mistakes in recordings and push tables before training. Checks units, topics, frames, the outline, "
+    "clocks and the wrench, and which sides, speeds and angles were pushed. Estimates each correction with its "
+    "standard deviation.",
+    "push_predictor check bags/square_abs_train",
+    data_argument(),
+    Output("--page", type=Path, metavar="FILE.html", help="write a page: tracks, contacts, coverage"),
+    *READING,
+)
 def run(options: argparse.Namespace) -> None:
     """Check the data and print the findings. Raises RecordingError that names what is refused."""
     from push_predictor.evaluation.check_page import check_json, pushed, write_check_page
     from push_predictor.recordings.checks.check import checked_data
     from push_predictor.reporting import html
 
-    check_data(options.data)
-    check_output("--page", options.page, force=options.force)
     if options.page is not None:
         html.check_installed("--page")
     reading = Reading(options)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 from push_predictor import __version__
-from push_predictor.commands.common.options import add_command
+from push_predictor.commands.common.command import command
 from push_predictor.commands.common.output import write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.compiled import REMEDY
@@ -50,17 +50,11 @@ class Finding:
         return [f"{self.state:8s} {self.name:12s} {self.found}", *remedy]
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `doctor`."""
-    parser = add_command(
-        commands,
-        "doctor",
-        "Check this installation. Imports packages and compiled modules, predicts one push, and creates a ROS node.",
-        "push_predictor doctor --json -",
-    )
-    parser.set_defaults(run=run)
-
-
+@command(
+    "doctor",
+    "Check this installation. Imports packages and compiled modules, predicts one push, and creates a ROS node.",
+    "push_predictor doctor --json -",
+)
 def run(options: argparse.Namespace) -> None:
     """Run all checks and print the findings. Raises PushPredictorError that names what is missing."""
     with progress("doctor"):

@@ -7,25 +7,20 @@ from __future__ import annotations
 
 import argparse
 
-from push_predictor.commands.common.options import Reading, add_command, add_data, add_model, add_reading
-from push_predictor.commands.common.output import check_data, warn, write_json
+from push_predictor.commands.common.command import command
+from push_predictor.commands.common.options import READING, Reading, data_argument, model_argument
+from push_predictor.commands.common.output import warn, write_json
 from push_predictor.commands.common.progress import progress
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `evaluate`."""
-    parser = add_command(
-        commands,
-        "evaluate",
-        "Score a model on data it was not trained on. Prints NMSE, NLPD and coverage with 95 % intervals.",
-        "push_predictor evaluate square_abs.pushmodel bags/square_abs_test --json -",
-    )
-    add_model(parser)
-    add_data(parser)
-    add_reading(parser)
-    parser.set_defaults(run=run)
-
-
+@command(
+    "evaluate",
+    "Score a model on data it was not trained on. Prints NMSE, NLPD and coverage with 95 % intervals.",
+    "push_predictor evaluate square_abs.pushmodel bags/square_abs_test --json -",
+    model_argument(),
+    data_argument(),
+    *READING,
+)
 def run(options: argparse.Namespace) -> None:
     """Score the model, print the scores, and warn about training pushes and other sliders."""
     from push_predictor.evaluation.metrics import metrics_lines
@@ -39,7 +34,6 @@ def run(options: argparse.Namespace) -> None:
     model = load_model(options.model)
     reading = Reading(options)
     given, checks = reading.rig, reading.checks
-    check_data(options.data)
     with progress("evaluate"):
         supports = {} if given else different_supports(options.data)
         table = load_data(options.data, given, numbered=bool(supports), topics=reading.topics, inspect=checks)

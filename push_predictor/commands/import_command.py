@@ -8,28 +8,23 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.options import add_command, add_out, add_rig, given_rig
+from push_predictor.commands.common.command import Option, command
+from push_predictor.commands.common.options import OUT_FOLDER, RIG, given_rig
 from push_predictor.commands.common.output import check_folder, write_json
 from push_predictor.commands.common.progress import progress
 
 KINDS = ("mit", "mit-square", "mlab", "mcube", "rosbag1")
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `import`."""
-    parser = add_command(
-        commands,
-        "import",
-        "Convert recordings of other laboratories. Reports what was dropped, repaired and assumed.",
-        "push_predictor import mit-square pushes_3500.npz --out imported",
-    )
-    parser.add_argument("kind", choices=KINDS, metavar="KIND", help=f"format of the sources: {', '.join(KINDS)}")
-    parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="files or folders to convert")
-    add_out(parser, "a folder")
-    add_rig(parser)
-    parser.set_defaults(run=run)
-
-
+@command(
+    "import",
+    "Convert recordings of other laboratories. Reports what was dropped, repaired and assumed.",
+    "push_predictor import mit-square pushes_3500.npz --out imported",
+    Option("kind", choices=KINDS, metavar="KIND", help=f"format of the sources: {', '.join(KINDS)}"),
+    Option("sources", nargs="+", type=Path, metavar="SOURCE", help="files or folders to convert"),
+    OUT_FOLDER,
+    RIG,
+)
 def run(options: argparse.Namespace) -> None:
     """Convert the sources and print a report."""
     from push_predictor.recordings.importers import import_source

@@ -11,15 +11,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_rig,
-    add_topics,
-    given_rig,
-    save_topics_of,
-    topics_of,
-)
-from push_predictor.commands.common.output import check_output, write_json
+from push_predictor.commands.common.command import Option, Output, command
+from push_predictor.commands.common.options import RIG, TOPICS, Reading
+from push_predictor.commands.common.output import write_json
 from push_predictor.errors import RequestError
 
 if TYPE_CHECKING:
@@ -34,23 +28,15 @@ BIAS_UNITS = {
 }
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `info`."""
-    parser = add_command(
-        commands,
-        "info",
-        "Describe a recording, push table or model file. Lists what is damaged.",
-        "push_predictor info bags/square_abs_test",
-    )
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording, push table or model file")
-    add_rig(parser)
-    parser.add_argument(
-        "--rig-out", type=Path, metavar="FILE.yaml", help="write the rig; it is that of the push_rig record"
-    )
-    add_topics(parser)
-    parser.set_defaults(run=run)
-
-
+@command(
+    "info",
+    "Describe a recording, push table or model file. Lists what is damaged.",
+    "push_predictor info bags/square_abs_test",
+    Option("file", type=Path, metavar="FILE", help="a recording, push table or model file"),
+    RIG,
+    Output("--rig-out", type=Path, metavar="FILE.yaml", help="write the rig; it is that of the push_rig record"),
+    TOPICS,
+)
 def run(options: argparse.Namespace) -> None:
     """Describe the file and print the description."""
     from push_predictor.errors import RecordingError
@@ -64,8 +50,9 @@ def run(options: argparse.Namespace) -> None:
     if options.rig_out is not None:
         _write_rig(options)
     if is_recording(path):
-        found = describe_recording(path, topics_of(options), given_rig(options))
-        save_topics_of(options, [path])
+        reading = Reading(options)
+        found = describe_recording(path, reading.topics, reading.rig)
+        reading.save_topics([path])
     elif path.name.endswith((".csv", ".csv.gz")):
         found = describe_table(path)
     elif path.suffix == ".parquet":
@@ -82,7 +69,6 @@ def _write_rig(options: argparse.Namespace) -> None:
     from push_predictor.recordings.rig import save_rig
     from push_predictor.recordings.table_file import is_recording
 
-    check_output("--rig-out", options.rig_out, force=options.force)
     if not is_recording(options.file):
         raise RequestError("--rig-out", str(options.rig_out), f"it with a recording: {options.file} is none")
     save_rig(required_rig(options.file), options.rig_out)

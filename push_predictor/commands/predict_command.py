@@ -8,7 +8,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import add_command, add_covariate, add_model, covariates_of
+from push_predictor.commands.common.command import Option, command
+from push_predictor.commands.common.options import COVARIATE, covariates_of, model_argument
 from push_predictor.commands.common.output import write_json
 from push_predictor.errors import RequestError
 
@@ -26,39 +27,31 @@ LEVEL = 0.95
 INTERVAL_KINDS = ("student", "conformal")  # those of models/predictors/tails.py, which imports scipy
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `predict`."""
-    parser = add_command(
-        commands,
-        "predict",
-        "Predict the outcome of one push. Prints mean, standard deviation and 95 % interval of dx, dy and dtheta; "
-        "--json gives the covariance in m and rad.",
-        "push_predictor predict square_abs.pushmodel --velocity 0.02 --contact 0.1 --angle 0.3",
-    )
-    add_model(parser)
-    parser.add_argument("--velocity", required=True, type=float, metavar="V", help="speed of the pusher in m/s")
-    parser.add_argument(
+@command(
+    "predict",
+    "Predict the outcome of one push. Prints mean, standard deviation and 95 % interval of dx, dy and dtheta; "
+    "--json gives the covariance in m and rad.",
+    "push_predictor predict square_abs.pushmodel --velocity 0.02 --contact 0.1 --angle 0.3",
+    model_argument(),
+    Option("--velocity", required=True, type=float, metavar="V", help="speed of the pusher in m/s"),
+    Option(
         "--contact",
         required=True,
         type=float,
         metavar="C",
         help="contact point, as a fraction of the perimeter, 0 to 1",
-    )
-    parser.add_argument(
-        "--angle", required=True, type=float, metavar="A", help="push angle in rad, from the inward normal"
-    )
-    parser.add_argument("--duration", type=float, default=0.2, metavar="T", help="duration in s (default %(default)s)")
-    add_covariate(parser)
-    parser.add_argument(
+    ),
+    Option("--angle", required=True, type=float, metavar="A", help="push angle in rad, from the inward normal"),
+    Option("--duration", type=float, default=0.2, metavar="T", help="duration in s (default %(default)s)"),
+    COVARIATE,
+    Option(
         "--interval",
         choices=INTERVAL_KINDS,
         default="student",
         help="student: from the predicted distribution; conformal: from the errors on held-out training pushes, "
         "whatever their distribution (default %(default)s)",
-    )
-    parser.set_defaults(run=run)
-
-
+    ),
+)
 def run(options: argparse.Namespace) -> None:
     """Check the push, predict its outcome, print it."""
     import numpy as np

@@ -11,8 +11,9 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import add_command, add_out, add_rig, add_topics, topics_of
-from push_predictor.commands.common.output import check_output, write_json
+from push_predictor.commands.common.command import Option, command
+from push_predictor.commands.common.options import RIG, SAVED_TOPICS, out_option, topics_of
+from push_predictor.commands.common.output import write_json
 from push_predictor.errors import PushPredictorError
 
 if TYPE_CHECKING:
@@ -21,30 +22,23 @@ if TYPE_CHECKING:
 NOTHING = "No message arrived. No bag was written."
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `record`."""
-    parser = add_command(
-        commands,
-        "record",
-        "Record the topics of a rig into an MCAP bag. Shows the push windows found so far, the share of contact, gaps "
-        "and what is missing. Ctrl-C ends the recording.",
-        "push_predictor record --rig rig.yaml --slider-topic /vicon/block/block --out monday",
-    )
-    add_out(parser, "the bag, a folder or FILE.mcap")
-    add_rig(parser)
-    add_topics(parser, saves=True)
-    parser.add_argument(
+@command(
+    "record",
+    "Record the topics of a rig into an MCAP bag. Shows the push windows found so far, the share of contact, gaps "
+    "and what is missing. Ctrl-C ends the recording.",
+    "push_predictor record --rig rig.yaml --slider-topic /vicon/block/block --out monday",
+    out_option("the bag, a folder or FILE.mcap", lambda path: path.suffix != ".mcap"),
+    RIG,
+    SAVED_TOPICS,
+    Option(
         "--duration", type=float, default=0.0, metavar="T", help="duration in s: end this long after the first message"
-    )
-    parser.add_argument(
+    ),
+    Option(
         "--use-sim-time", action="store_true", help="the log time is that of /clock, as of a replay or a simulation"
-    )
-    parser.set_defaults(run=run)
-
-
+    ),
+)
 def run(options: argparse.Namespace) -> None:
     """Record until Ctrl-C. Raises PushPredictorError without ROS, SystemExit where the recording fails."""
-    check_output("--out", options.out, force=options.force, folder=options.out.suffix != ".mcap")
     try:
         summary = _recorded(options)
     except KeyboardInterrupt:  # before the node handles signals

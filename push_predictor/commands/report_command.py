@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import Reading, add_command, add_model, add_out, add_reading
+from push_predictor.commands.common.command import Commands, Option, command
+from push_predictor.commands.common.options import OUT_FOLDER, READING, Reading, model_argument
 from push_predictor.commands.common.output import check_folder, warn, write_json, write_text
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import PushPredictorError, RequestError
@@ -27,68 +28,50 @@ VALIDATION_EXAMPLE = (
 PAPER_IS_MISSING = (
     "`report paper` needs the package push_predictor_paper: pip install ./push_predictor_paper in the repository"
 )
+FEW_PUSHES = Option("--quick", action="store_true", help="use few pushes, to test that it runs")
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `report` with a parser for each kind."""
-    summary = "Write an HTML page with tables and figures. Both kinds take --quick, --out PATH, --force, --json FILE|-."
-    parser = commands.add_parser(
-        "report",
-        help=summary.partition(". ")[0],
-        description=summary,
-        epilog=f"example:\n  {VALIDATION_EXAMPLE}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
-    kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
-    _add_validation(kinds)
-    _add_paper(kinds)
+class Report:
+    """The command `report`, with a command for each kind."""
+
+    def add_to(self, commands: Commands) -> None:
+        """Add its parser to those of the commands."""
+        summary = (
+            "Write an HTML page with tables and figures. Both kinds take --quick, --out PATH, --force, --json FILE|-."
+        )
+        parser = commands.add_parser(
+            "report",
+            help=summary.partition(". ")[0],
+            description=summary,
+            epilog=f"example:\n  {VALIDATION_EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
+        for kind in (validation, paper):
+            kind.add_to(kinds)
 
 
-def _add_validation(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = add_command(
-        kinds,
-        "validation",
-        "Compare models with a recording. Without MODEL and --recording it simulates a square on ABS and trains on "
-        "that.",
-        VALIDATION_EXAMPLE,
-    )
-    add_model(parser, "*", note="; the report compares the others with the first")
-    meaning = "a recording; give one that was not used for training"
-    parser.add_argument("--recording", type=Path, metavar="RECORDING", help=meaning)
-    _add_common(parser)
-    add_reading(parser)
-    parser.set_defaults(run=_validation)
+run = Report()
 
 
-def _add_paper(kinds: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = add_command(
-        kinds,
-        "paper",
-        "Check the claims of Bauza and Rodriguez (2017). Uses simulated pushes, with --data also measured ones. An "
-        "interrupted report continues from its results in the folder work of --out.",
-        "push_predictor report paper --quick --out paper",
-    )
-    parser.add_argument(
+@command(
+    "paper",
+    "Check the claims of Bauza and Rodriguez (2017). Uses simulated pushes, with --data also measured ones. An "
+    "interrupted report continues from its results in the folder work of --out.",
+    "push_predictor report paper --quick --out paper",
+    Option(
         "--data",
         type=Path,
         metavar="FOLDER",
         help="folder of measured pushes: mit_square, or files of the MIT push data set",
-    )
-    parser.add_argument(
-        "--recordings", type=Path, metavar="FOLDER", help="keep the simulated recordings here (about 1 GB)"
-    )
-    parser.add_argument("--jobs", type=int, metavar="N", help="parallel jobs (default: one per core)")
-    _add_common(parser)
-    parser.set_defaults(run=_paper)
-
-
-def _add_common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--quick", action="store_true", help="use few pushes, to test that it runs")
-    add_out(parser, "a folder")
-
-
-def _paper(options: argparse.Namespace) -> None:
+    ),
+    Option("--recordings", type=Path, metavar="FOLDER", help="keep the simulated recordings here (about 1 GB)"),
+    Option("--jobs", type=int, metavar="N", help="parallel jobs (default: one per core)"),
+    FEW_PUSHES,
+    OUT_FOLDER,
+)
+def paper(options: argparse.Namespace) -> None:
     """Check the claims of the paper and write the page."""
     _make_folder(options, ("paper.html", "paper.json"))
     try:
@@ -113,7 +96,22 @@ def _paper(options: argparse.Namespace) -> None:
         print(page)
 
 
-def _validation(options: argparse.Namespace) -> None:
+@command(
+    "validation",
+    "Compare models with a recording. Without MODEL and --recording it simulates a square on ABS and trains on that.",
+    VALIDATION_EXAMPLE,
+    model_argument("*", note="; the report compares the others with the first"),
+    Option(
+        "--recording",
+        type=Path,
+        metavar="RECORDING",
+        help="a recording; give one that was not used for training",
+    ),
+    FEW_PUSHES,
+    OUT_FOLDER,
+    *READING,
+)
+def validation(options: argparse.Namespace) -> None:
     """Compare models with a recording and write the page."""
     import json
 

@@ -9,16 +9,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import (
-    add_command,
-    add_out,
-    add_rig,
-    add_topics,
-    given_rig,
-    save_topics_of,
-    topics_of,
-)
-from push_predictor.commands.common.output import check_data, check_output, write_json, write_text
+from push_predictor.commands.common.command import Group, Option, Output, command
+from push_predictor.commands.common.options import RIG, TOPICS, Reading, out_option
+from push_predictor.commands.common.output import check_data, write_json, write_text
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError, RigError
 
@@ -34,79 +27,69 @@ SHAPES = ("square", "rectangle", "circle", "ellipse", "polygon")
 PICTURES = ".svg"
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `rig`."""
-    parser = add_command(
-        commands,
-        "rig",
-        "Write a rig file from the sizes of a shape. The sizes are those that a caliper measures, in metres: "
-        "sides, diameters, full axes. With --from, the contacts of a recording correct yaw, place, size or tip radius.",
-        "push_predictor rig --square 0.09 --tip-radius 0.00475 --surface plywood --out rig.yaml",
-    )
-    _add_shapes(parser)
-    _add_measured(parser)
-    add_rig(parser)
-    add_topics(parser)
-    add_out(parser, "the rig file, FILE.yaml")
-    parser.add_argument("--picture", type=Path, metavar="FILE.svg", help="draw outline, axes and tip to scale")
-    parser.set_defaults(run=run)
-
-
-def _add_shapes(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group(
-        "shape of the slider, seen from above, or a recording that corrects a rig",
-        "The origin is the centroid. x and y are the axes of the tracked frame.",
-    )
-    one = group.add_mutually_exclusive_group(required=True)
-    one.add_argument("--square", type=float, metavar="SIDE")
-    one.add_argument("--rectangle", type=float, nargs=2, metavar=("X", "Y"), help="sizes along x and along y")
-    one.add_argument("--circle", type=float, metavar="DIAMETER", help="the diameter, not the radius")
-    one.add_argument("--ellipse", type=float, nargs=2, metavar=("X", "Y"), help="full axes along x and along y")
-    one.add_argument(
-        "--polygon",
-        type=Path,
-        metavar="FILE",
-        help="vertices in order around the slider, in metres: CSV with the columns x,y, or a YAML or JSON list "
-        "of [x, y]",
-    )
-    one.add_argument(
-        "--from",
-        dest="recording",
-        type=Path,
-        metavar="RECORDING",
-        help="correct outline or tip radius by at least 8 pushes; the rig to correct is that of --rig, or recorded",
-    )
-    group.add_argument(
-        "--keep-origin", action="store_true", help="the file's origin is that of the tracked frame: do not move it"
-    )
-    group.add_argument("--name", help="name: of the shape; default: square, rectangle, ... or the name of the file")
-
-
-def _add_measured(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("what else was measured")
-    group.add_argument("--tip-radius", type=float, metavar="R", help="radius of the pusher's round tip, m")
-    group.add_argument("--surface", metavar="NAME", help="name of the surface")
-    group.add_argument("--mass", type=float, metavar="KG", help="mass of the slider, kg, if it is known")
-    group.add_argument("--contact-friction", type=float, metavar="MU", help="pusher on slider, if it is known")
-    group.add_argument("--surface-friction", type=float, metavar="MU", help="slider on surface, if it is known")
-    group.add_argument(
+SHAPE = Group(
+    "shape of the slider, seen from above, or a recording that corrects a rig",
+    "The origin is the centroid. x and y are the axes of the tracked frame.",
+    Option("--keep-origin", action="store_true", help="the file's origin is that of the tracked frame: do not move it"),
+    Option("--name", help="name: of the shape; default: square, rectangle, ... or the name of the file"),
+    one_of=(
+        Option("--square", type=float, metavar="SIDE"),
+        Option("--rectangle", type=float, nargs=2, metavar=("X", "Y"), help="sizes along x and along y"),
+        Option("--circle", type=float, metavar="DIAMETER", help="the diameter, not the radius"),
+        Option("--ellipse", type=float, nargs=2, metavar=("X", "Y"), help="full axes along x and along y"),
+        Option(
+            "--polygon",
+            type=Path,
+            metavar="FILE",
+            help="vertices in order around the slider, in metres: CSV with the columns x,y, or a YAML or JSON list "
+            "of [x, y]",
+        ),
+        Option(
+            "--from",
+            dest="recording",
+            type=Path,
+            metavar="RECORDING",
+            help="correct outline or tip radius by at least 8 pushes; the rig to correct is that of --rig, or recorded",
+        ),
+    ),
+)
+MEASUREMENTS = Group(
+    "what else was measured",
+    None,
+    Option("--tip-radius", type=float, metavar="R", help="radius of the pusher's round tip, m"),
+    Option("--surface", metavar="NAME", help="name of the surface"),
+    Option("--mass", type=float, metavar="KG", help="mass of the slider, kg, if it is known"),
+    Option("--contact-friction", type=float, metavar="MU", help="pusher on slider, if it is known"),
+    Option("--surface-friction", type=float, metavar="MU", help="slider on surface, if it is known"),
+    Option(
         "--support-point",
         type=float,
         nargs=3,
         action="append",
         metavar=("X", "Y", "SHARE"),
         help="a foot of the slider, m, and its share of the load, if known; may be repeated",
-    )
+    ),
+)
 
 
+@command(
+    "rig",
+    "Write a rig file from the sizes of a shape. The sizes are those that a caliper measures, in metres: "
+    "sides, diameters, full axes. With --from, the contacts of a recording correct yaw, place, size or tip radius.",
+    "push_predictor rig --square 0.09 --tip-radius 0.00475 --surface plywood --out rig.yaml",
+    SHAPE,
+    MEASUREMENTS,
+    RIG,
+    TOPICS,
+    out_option("the rig file, FILE.yaml"),
+    Output("--picture", type=Path, metavar="FILE.svg", help="draw outline, axes and tip to scale"),
+)
 def run(options: argparse.Namespace) -> None:
     """Write the rig file. Raises RequestError or RigError that names the option or file."""
     from push_predictor.recordings.new_rig import rig_lines
     from push_predictor.recordings.rig import save_rig
     from push_predictor.reporting.rig_picture import rig_svg
 
-    check_output("--out", options.out, force=options.force)
-    check_output("--picture", options.picture, force=options.force)
     if options.picture is not None and options.picture.suffix != PICTURES:
         raise RequestError("--picture", str(options.picture), f"a file that ends with {PICTURES}")
     shape = next((name for name in SHAPES if getattr(options, name) is not None), None)
@@ -150,14 +133,15 @@ def _corrected(options: argparse.Namespace) -> tuple[Rig, tuple[str, ...], tuple
 
     check_data([options.recording])
     with progress("rig"):
-        recording = read_recording(options.recording, rig=given_rig(options), topics=topics_of(options))
+        reading = Reading(options)
+        recording = read_recording(options.recording, rig=reading.rig, topics=reading.topics)
         rig = require_rig(recording)
         findings = check_recording(recording, rig)
         try:
             rig = corrected_rig(rig, findings)
         except RigError as error:
             raise RigError(f"{options.recording}: {error}") from None
-        save_topics_of(options, [options.recording])
+        reading.save_topics([options.recording])
     return rig, (), findings
 
 

@@ -7,36 +7,27 @@ from __future__ import annotations
 
 import argparse
 
-from push_predictor.commands.common.options import add_command, add_out, add_seed, add_travel
-from push_predictor.commands.common.output import check_output, check_seed, write_json
+from push_predictor.commands.common.command import Option, command
+from push_predictor.commands.common.options import TRAVEL, out_option, seed_option
+from push_predictor.commands.common.output import write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.watch import part_of
 
 BEFORE_WRITING = 0.6  # share of the time
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `simulate`."""
-    parser = add_command(
-        commands,
-        "simulate",
-        "Simulate random pushes and write them as a recording.",
-        "push_predictor simulate --shape rect1 --surface abs --pushes 60 --speed 0.02 0.05 --seed 1 --out pushes",
-    )
-    parser.add_argument(
-        "--shape", required=True, help="slider: rect1 (square), ellip1 (circle), ellip2, ellip3 (ellipses) or hex"
-    )
-    parser.add_argument(
-        "--surface", required=True, metavar="NAME", help="name of the surface: plywood, delrin, pu or abs"
-    )
-    parser.add_argument("--pushes", required=True, type=int, metavar="N", help="number of pushes")
-    parser.add_argument("--speed", required=True, type=float, nargs="+", metavar="V", help="pusher speeds in m/s")
-    add_travel(parser)
-    add_seed(parser, "pushes, surface and sensors")
-    add_out(parser, "the recording, a folder or FILE.mcap")
-    parser.set_defaults(run=run)
-
-
+@command(
+    "simulate",
+    "Simulate random pushes and write them as a recording.",
+    "push_predictor simulate --shape rect1 --surface abs --pushes 60 --speed 0.02 0.05 --seed 1 --out pushes",
+    Option("--shape", required=True, help="slider: rect1 (square), ellip1 (circle), ellip2, ellip3 (ellipses) or hex"),
+    Option("--surface", required=True, metavar="NAME", help="name of the surface: plywood, delrin, pu or abs"),
+    Option("--pushes", required=True, type=int, metavar="N", help="number of pushes"),
+    Option("--speed", required=True, type=float, nargs="+", metavar="V", help="pusher speeds in m/s"),
+    TRAVEL,
+    seed_option("pushes, surface and sensors"),
+    out_option("the recording, a folder or FILE.mcap", lambda path: path.suffix != ".mcap"),
+)
 def run(options: argparse.Namespace) -> None:
     """Simulate the pushes and write the recording."""
     import numpy as np
@@ -48,8 +39,6 @@ def run(options: argparse.Namespace) -> None:
 
     if options.pushes < 1:
         raise RequestError("--pushes", options.pushes, "an integer of at least 1")
-    check_seed(options.seed)
-    check_output("--out", options.out, force=options.force, folder=options.out.suffix != ".mcap")
     rng = np.random.default_rng([options.seed, 0])
     plan = random_pushes(options.pushes, options.speed, options.travel, rng)
     name = options.out.name.removesuffix(".mcap")

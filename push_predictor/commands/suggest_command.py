@@ -9,20 +9,19 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from push_predictor.commands.common.command import Option, command
 from push_predictor.commands.common.options import (
-    add_command,
-    add_covariate,
-    add_model,
-    add_out,
-    add_rig,
-    add_seed,
-    add_topics,
-    add_travel,
+    COVARIATE,
+    RIG,
+    TOPICS,
+    TRAVEL,
+    Reading,
     covariates_of,
-    save_topics_of,
-    topics_of,
+    model_argument,
+    out_option,
+    seed_option,
 )
-from push_predictor.commands.common.output import check_data, check_output, check_seed, warn, write_json, write_text
+from push_predictor.commands.common.output import check_data, write_json, write_text
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
 
@@ -35,28 +34,29 @@ if TYPE_CHECKING:
 COLUMNS = ("velocity", "contact", "angle", "duration", "variance_left")
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `suggest`."""
-    parser = add_command(
-        commands,
-        "suggest",
-        "Propose the pushes that a model learns most from. They most reduce what its uncertain mean function costs in "
-        "log predictive density. Without a model, --rig gives a slider that nobody has pushed yet.",
-        "push_predictor suggest square_abs.pushmodel --count 20 --travel 0.03 --out pushes.csv",
-    )
-    add_model(parser, "?", note="; give it or --rig")
-    parser.add_argument("--count", type=int, default=20, metavar="N", help="number of pushes (default %(default)s)")
-    two, of_training = ("LOW", "HIGH"), "default: those of the training pushes"
-    parser.add_argument("--speed-range", type=float, nargs=2, metavar=two, help=f"pusher speeds in m/s ({of_training})")
-    parser.add_argument(
+@command(
+    "suggest",
+    "Propose the pushes that a model learns most from. They most reduce what its uncertain mean function costs in "
+    "log predictive density. Without a model, --rig gives a slider that nobody has pushed yet.",
+    "push_predictor suggest square_abs.pushmodel --count 20 --travel 0.03 --out pushes.csv",
+    model_argument("?", note="; give it or --rig"),
+    Option("--count", type=int, default=20, metavar="N", help="number of pushes (default %(default)s)"),
+    Option(
+        "--speed-range",
+        type=float,
+        nargs=2,
+        metavar=("LOW", "HIGH"),
+        help="pusher speeds in m/s (default: those of the training pushes)",
+    ),
+    Option(
         "--angle-range",
         type=float,
         nargs=2,
-        metavar=two,
+        metavar=("LOW", "HIGH"),
         help="push angles in rad (default: ±1, or those of training)",
-    )
-    add_travel(parser)
-    parser.add_argument(
+    ),
+    TRAVEL,
+    Option(
         "--exclude",
         type=float,
         nargs=2,
@@ -64,35 +64,31 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         default=[],
         metavar=("FROM", "TO"),
         help="contacts that the robot cannot push, as fractions of the perimeter; may be repeated",
-    )
-    parser.add_argument(
+    ),
+    Option(
         "--transfer-speed",
         type=float,
         metavar="V",
         help="speed in m/s of the tip around the slider between pushes: choose by the gain per second",
-    )
-    parser.add_argument(
+    ),
+    Option(
         "--matter",
         type=Path,
         metavar="DATA",
         help="recording or table of the pushes that matter (default: all possible)",
-    )
-    add_covariate(parser)
-    add_seed(parser, "the candidates")
-    add_out(parser, "the pushes in order, FILE.csv")
-    add_rig(parser)
-    add_topics(parser)
-    parser.set_defaults(run=run, call_is_wrong=parser.error)
-
-
+    ),
+    COVARIATE,
+    seed_option("the candidates"),
+    out_option("the pushes in order, FILE.csv"),
+    RIG,
+    TOPICS,
+)
 def run(options: argparse.Namespace) -> None:
     """Check the call, choose the pushes, write them and print the first."""
     from push_predictor.design.batch import suggest_pushes
 
     if (options.model is None) == (options.rig is None):
         options.call_is_wrong("give either MODEL or --rig FILE.yaml")
-    check_seed(options.seed)
-    check_output("--out", options.out, force=options.force)
     limits, model = _limits(options), _model(options)
     matter = None if options.matter is None else _matter(options, model)
     with progress("suggest") as watch:
@@ -137,13 +133,12 @@ def _model(options: argparse.Namespace) -> PushModel:
 
 def _matter(options: argparse.Namespace, model: PushModel) -> Pushes:
     from push_predictor.models.pushes import Pushes
-    from push_predictor.recordings.checks.check import DataChecks
     from push_predictor.recordings.load import load_data
 
-    path = options.matter
+    path, reading = options.matter, Reading(options)
     check_data([path])
-    table = load_data([path], model.rig, topics=topics_of(options), inspect=DataChecks(False, warn))
-    save_topics_of(options, [path])
+    table = load_data([path], model.rig, topics=reading.topics, inspect=reading.checks)
+    reading.save_topics([path])
     if not len(table):
         raise RequestError("--matter", str(path), "a recording or table with at least one window")
     velocity, contact, angle = table.inputs.T

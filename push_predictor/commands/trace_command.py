@@ -10,8 +10,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import Reading, add_command, add_data, add_model, add_reading, add_seed
-from push_predictor.commands.common.output import check_data, check_output, check_seed, warn, write_json
+from push_predictor.commands.common.command import Option, Output, command
+from push_predictor.commands.common.options import READING, Reading, data_argument, model_argument, seed_option
+from push_predictor.commands.common.output import warn, write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
 
@@ -19,35 +20,27 @@ if TYPE_CHECKING:
     from push_predictor.residuals.outcome import Trace
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `trace`."""
-    parser = add_command(
-        commands,
-        "trace",
-        "Find what a model fails to explain on new pushes and trace it to an effect. Add the effect to the model and "
-        "compare before and after on held-out pushes.",
-        "push_predictor trace abs.pushmodel bags/new --report trace.html --save-model extended.pushmodel",
-    )
-    add_model(parser)
-    add_data(parser)
-    parser.add_argument(
+@command(
+    "trace",
+    "Find what a model fails to explain on new pushes and trace it to an effect. Add the effect to the model and "
+    "compare before and after on held-out pushes.",
+    "push_predictor trace abs.pushmodel bags/new --report trace.html --save-model extended.pushmodel",
+    model_argument(),
+    data_argument(),
+    Option(
         "--covariates", metavar="NAME,...", help="covariates to try, topic:/NAME for a recorded scalar (default: all)"
-    )
-    parser.add_argument(
-        "--alpha", type=float, default=0.01, help="family-wise significance level (default %(default)s)"
-    )
-    add_seed(parser, "the bootstrap")
-    parser.add_argument("--report", type=Path, metavar="OUT.html", help="write an HTML page with figures")
-    parser.add_argument(
+    ),
+    Option("--alpha", type=float, default=0.01, help="family-wise significance level (default %(default)s)"),
+    seed_option("the bootstrap"),
+    Output("--report", type=Path, metavar="OUT.html", help="write an HTML page with figures"),
+    Output(
         "--save-model",
         type=Path,
         metavar="EXTENDED",
         help="write the extended model to this file, if it improves the log density of held-out pushes",
-    )
-    add_reading(parser)
-    parser.set_defaults(run=run)
-
-
+    ),
+    *READING,
+)
 def run(options: argparse.Namespace) -> None:
     """Trace, write JSON and model, print the verdict, then draw the report: what can fail late comes last."""
     from push_predictor.residuals.trace import trace_data
@@ -83,12 +76,8 @@ def _check(options: argparse.Namespace) -> None:
 
     if not 0.0 < options.alpha < 1.0:
         raise RequestError("--alpha", options.alpha, "a number above 0 and below 1")
-    check_seed(options.seed)
-    check_output("--report", options.report, force=options.force)
-    check_output("--save-model", options.save_model, force=options.force)
     if options.report is not None:
         html.check_installed("--report")
-    check_data(options.data)
 
 
 def _names(text: str) -> list[str]:

@@ -12,16 +12,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.commands.common.options import Reading, add_command, add_out, add_reading, add_seed
-from push_predictor.commands.common.output import (
-    check_data,
-    check_folder,
-    check_output,
-    check_seed,
-    warn,
-    write_json,
-    write_text,
-)
+from push_predictor.commands.common.command import Option, command
+from push_predictor.commands.common.options import READING, Reading, data_argument, out_option, seed_option
+from push_predictor.commands.common.output import check_folder, warn, write_json, write_text
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import PushPredictorError, RequestError
 
@@ -37,53 +30,43 @@ LEARNT = ("vhgp", "gp")
 KINDS = ("vhgp", "gp", "analytical", "prior")
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `train`."""
-    parser = add_command(
-        commands,
-        "train",
-        "Train a model from recordings or push tables and save it. vhgp learns mean and noise of the outcome, gp the "
-        "mean with constant noise. analytical is quasi-static mechanics. prior predicts from outline and priors "
-        "before the first push; DATA update it.",
-        "push_predictor train bags/square_abs_train --kind vhgp --out square_abs.pushmodel",
-    )
-    parser.add_argument(
-        "data", nargs="*", type=Path, metavar="DATA", help="recordings or push tables; --kind prior needs only --rig"
-    )
-    parser.add_argument("--kind", required=True, choices=KINDS, help="kind of model")
-    parser.add_argument(
+@command(
+    "train",
+    "Train a model from recordings or push tables and save it. vhgp learns mean and noise of the outcome, gp the "
+    "mean with constant noise. analytical is quasi-static mechanics. prior predicts from outline and priors "
+    "before the first push; DATA update it.",
+    "push_predictor train bags/square_abs_train --kind vhgp --out square_abs.pushmodel",
+    data_argument("*", "; --kind prior needs only --rig"),
+    Option("--kind", required=True, choices=KINDS, help="kind of model"),
+    Option(
         "--n-train",
         type=int,
         metavar="N",
         help="train on N random windows (default: all; at most 1000, with --fit 4000, spread over all pushes)",
-    )
-    parser.add_argument(
+    ),
+    Option(
         "--inducing",
         type=int,
         metavar="M",
         help="vhgp: train a sparse model with M inducing inputs (default: dense up to 1000 windows, else M = 100)",
-    )
-    parser.add_argument(
+    ),
+    Option(
         "--mean",
         choices=MEANS,
         help="vhgp, gp: learn the residual of fitted mechanics (mechanics) or the outcome itself (zero). auto, the "
         "default, takes mechanics unless zero predicts held-out training pushes clearly better",
-    )
-    add_seed(parser, "--n-train and of the draws of a prior model")
-    parser.add_argument(
+    ),
+    seed_option("--n-train and of the draws of a prior model"),
+    Option(
         "--fit",
         action="store_true",
         help="analytical: choose and estimate parameters of friction, pressure, measurement and table",
-    )
-    parser.add_argument(
-        "--stride", type=float, metavar="S", help="time between window starts in s (default: the duration)"
-    )
-    parser.add_argument("--name", help="name: of the model in the services (default: the name of the file)")
-    add_out(parser, "the model, FILE.pushmodel")
-    add_reading(parser)
-    parser.set_defaults(run=run, call_is_wrong=parser.error)
-
-
+    ),
+    Option("--stride", type=float, metavar="S", help="time between window starts in s (default: the duration)"),
+    Option("--name", help="name: of the model in the services (default: the name of the file)"),
+    out_option("the model, FILE.pushmodel"),
+    *READING,
+)
 def run(options: argparse.Namespace) -> None:
     """Check the call, load the data, train the model and save it."""
     from push_predictor.models.store.model_file import save_model
@@ -140,9 +123,6 @@ def _mean(model: PushModel) -> str:
 
 def _check(options: argparse.Namespace, kind: str) -> None:
     """Raise RecordingError or RequestError for options that cannot work, before any data are read."""
-    check_data(options.data)
-    check_seed(options.seed)
-    check_output("--out", options.out, force=options.force)
     if options.fit:
         check_folder(
             "--out", options.out.parent, [path.name for path in _ladder_files(options.out)], force=options.force

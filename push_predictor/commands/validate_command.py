@@ -8,8 +8,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from push_predictor.commands.common.options import Reading, add_command, add_model, add_reading
-from push_predictor.commands.common.output import check_output, warn, write_json
+from push_predictor.commands.common.command import Option, Output, command
+from push_predictor.commands.common.options import READING, Reading, model_argument
+from push_predictor.commands.common.output import warn, write_json
 from push_predictor.commands.common.progress import progress
 from push_predictor.errors import RequestError
 from push_predictor.watch import part_of
@@ -17,28 +18,22 @@ from push_predictor.watch import part_of
 BEFORE_ALARM, BEFORE_ADAPTING = 0.2, 0.6  # shares of the time for windows and predictions, and for the alarm too
 
 
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the sub-command `validate`."""
-    parser = add_command(
-        commands,
-        "validate",
-        "Compare a model's predictions with a recording, window by window. Prints whether the model fits, the scores, "
-        "and the alarm with its evidence.",
-        "push_predictor validate square_abs.pushmodel bags/square_abs_test --json validation.json",
-    )
-    add_model(parser)
-    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a folder, .mcap, .db3 or .bag file")
-    parser.add_argument(
+@command(
+    "validate",
+    "Compare a model's predictions with a recording, window by window. Prints whether the model fits, the scores, "
+    "and the alarm with its evidence.",
+    "push_predictor validate square_abs.pushmodel bags/square_abs_test --json validation.json",
+    model_argument(),
+    Option("recording", type=Path, metavar="RECORDING", help="a folder, .mcap, .db3 or .bag file"),
+    Option(
         "--false-alarm-rate",
         type=float,
         default=0.01,
         metavar="R",
         help="largest probability that the alarm fires without a change (default %(default)s)",
-    )
-    parser.add_argument(
-        "--windows", type=Path, metavar="FILE.json", help="write prediction and outcome of every window"
-    )
-    parser.add_argument(
+    ),
+    Output("--windows", type=Path, metavar="FILE.json", help="write prediction and outcome of every window"),
+    Output(
         "--adapt",
         type=Path,
         nargs="?",
@@ -46,14 +41,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         metavar="PICTURE.png",
         help="let the model follow the pushes too: print and draw errors and parameters push by push (default "
         "%(const)s)",
-    )
-    parser.add_argument(
+    ),
+    Option(
         "--extended", type=Path, metavar="TRACED", help="with --adapt: a further model to compare, as that of a trace"
-    )
-    add_reading(parser)
-    parser.set_defaults(run=run)
-
-
+    ),
+    *READING,
+)
 def run(options: argparse.Namespace) -> None:
     """Compare, print the scores, and warn about training pushes and other sliders."""
     from push_predictor.adaptation.followed import follow
@@ -69,8 +62,6 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.load import required_rig
     from push_predictor.recordings.windows.push_window import windows_to_table
 
-    check_output("--windows", options.windows, force=options.force)
-    check_output("--adapt", options.adapt, force=options.force)
     if options.extended and not options.adapt:
         raise RequestError("--extended", str(options.extended), "only together with --adapt")
     _check_recording(options.recording)

@@ -5,39 +5,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from push_predictor.adaptation.adaptation import USUAL
 from push_predictor.evaluation.alarm.evidence import DEFAULT_RATE
 from push_predictor.nodes.parameters import Param
+from push_predictor.recordings.topic_settings import (
+    STAMP,
+    TOPICS,
+    UP,
+    WORLD_FRAME,
+    WRENCH_BIAS,
+    WRENCH_FRAME,
+    Setting,
+)
 from push_predictor.resources import SHIPPED
 
 LONGEST = 1.0e10  # s, 300 years: longer than any stamp
 RIG = Param("rig", "", "Rig file (YAML, a push_rig record). Empty: the record on topic rig.")
 STRICT = Param("strict", False, "Report a warning of the checks of the samples as an error in the diagnostics.")
-SAVED = "as in NAME.recording.yaml, or "
-UP = "Axis of the poses' world that points up: x, y, z, -x, -y or -z; of single streams as in slider=y,wrench=y."
+FROM_FILE = "Empty: as in NAME.recording.yaml, or {}."
 DIAGNOSTICS = Param("diagnostics_period", 1.0, "Seconds between two messages on /diagnostics.", low=0.1, high=60.0)
 
 
-def _topics(empty: str) -> tuple[Param, ...]:
-    """The topics of slider, pusher and wrench. empty: what comes before the default where a value is empty."""
-    return (
-        Param("slider_topic", "", f"The slider's pose: TOPIC, TOPIC.FIELD or /tf:FRAME. Empty: {empty}slider/pose."),
-        Param("pusher_topic", "", f"The pose of the pusher's tip, in the same manner. Empty: {empty}pusher/pose."),
-        Param("wrench_topic", "", f"The wrench at the tip: TOPIC or TOPIC.FIELD. Empty: {empty}pusher/wrench."),
-    )
-
-
-def _frames(empty: str, world: str) -> tuple[Param, ...]:
-    """The frames of a node that reads the streams. empty: as above; world: the frame of the poses without one."""
-    return (
-        Param(
-            "wrench_frame",
-            "",
-            f"Axes of the wrench: world, tip for those of its pose, or a frame of tf. Empty: {empty}world.",
-        ),
-        Param("world_frame", "", f"Frame of all poses; tf turns others into it. Empty: {empty}{world}."),
-        Param("stamp", "", f"Time of a sample: header, or log for that of its receipt. Empty: {empty}header."),
-        Param("up", "", f"{UP} Empty: {empty}z.", true_text="y"),
+def _settings(settings: Sequence[Setting], tail: str = "Empty: {}.") -> tuple[Param, ...]:
+    """Settings of the topics as parameters. tail: the last sentence of their descriptions, with the default."""
+    return tuple(
+        Param(each.name, "", f"{each.meaning}. {tail.format(each.default)}", true_text="y" if each is UP else "")
+        for each in settings
     )
 
 
@@ -79,21 +74,9 @@ PUSH_RECORDER = (
     Param("bag", "", "Bag to write: a folder, or FILE.mcap. Required."),
     Param("force", False, "Replace a bag that exists."),
     RIG,
-    *_topics(SAVED),
+    *_settings(TOPICS, FROM_FILE),
     # Messages are recorded as they are; frames and bias are written into NAME.recording.yaml.
-    Param(
-        "wrench_frame",
-        "",
-        "Axes of the wrench, saved for the readers: world, tip for those of its pose, or a frame of tf.",
-    ),
-    Param("world_frame", "", "Frame of all poses, saved for the readers, which turn others into it by tf."),
-    Param(
-        "wrench_bias",
-        "",
-        "Bias of the wrench, saved for the readers: free_motion to estimate and subtract it, or none.",
-    ),
-    Param("stamp", "", "Time of a sample, saved for the readers: header, or log for that of its receipt."),
-    Param("up", "", f"{UP} Saved for the readers.", true_text="y"),
+    *_settings((WRENCH_FRAME, WORLD_FRAME, WRENCH_BIAS, STAMP, UP), "Saved for the readers."),
     Param("covariate_topics", [""], "Further topics to record: TOPIC or TOPIC.FIELD."),
     Param("duration", 0.0, "Seconds after the first message at which the node ends. 0: at SIGINT.", low=0.0, high=1e9),
     DIAGNOSTICS,
@@ -102,8 +85,7 @@ PUSH_RECORDER = (
 PUSH_REPLAY = (
     Param("recording", "", "recording to play: a rosbag2 folder, .mcap, .db3 or .bag file, or folder of CSV streams"),
     Param("rig", "", "YAML file with the rig; it replaces the push_rig record of the recording"),
-    *_topics(SAVED),
-    *_frames(SAVED, "their own"),
+    *_settings((*TOPICS, WRENCH_FRAME, WORLD_FRAME, STAMP, UP), FROM_FILE),
     Param("wait_for_subscribers", 0.0, "longest wait in s until push topics and rig have subscribers", 0.0, 3600.0),
     Param("exit_when_finished", False, "end the process after the last message"),
     STRICT,
@@ -131,9 +113,9 @@ PUSH_VALIDATOR = (
     RIG,
     Param("output", "", "Folder for validation.json, windows.json, residuals and report. Empty: nothing is written."),
     Param("report", True, "Also write the HTML report when a recording has finished or ~/finish is called."),
-    *_topics(""),
-    *_frames("", "world; others are rejected"),
-    Param("wrench_bias", "", "Bias of the wrench: free_motion to estimate and subtract it, or none. Empty: none."),
+    *_settings((*TOPICS, WRENCH_FRAME)),
+    *_settings((WORLD_FRAME,), "Empty: world; others are rejected."),
+    *_settings((STAMP, UP, WRENCH_BIAS)),
     Param("covariate_topics", [""], "Topics with a number: TOPIC or TOPIC.FIELD. Every window gets their values."),
     Param("request_timeout", 2.0, "Seconds after which an unanswered request is sent again.", low=0.05, high=60.0),
     Param("last_answers", 30.0, "Longest wait for missing answers after a recording, in s.", low=0.0, high=3600.0),

@@ -10,17 +10,22 @@ from time import monotonic, time_ns
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.validate_topic_name import validate_topic_name
 
-from push_predictor.errors import PushPredictorError
+from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.parameters import given_value
-from push_predictor.nodes.qos import DEPTH, common_profile, message_class
+from push_predictor.nodes.qos import common_profile, message_class
 from push_predictor.nodes.runtime import of_rcl
+from push_predictor.recordings.decoder.decoder import name_of
+from push_predictor.recordings.decoder.sources import COVARIATE, sources_of
+from push_predictor.recordings.topics import Topics
 
 ONE_TYPE = "One type of publishers is accepted."
 
@@ -74,8 +79,8 @@ class FollowingSubscription:
 
     It takes serialized messages, with the reliability that all these publishers offer.
     unfit: called with a type, returns why it does not fit, '' if it does. first: the type to subscribe to before there
-    is a publisher, '' for none. depth: of its queue. earlier: also take what was sent before, if all publishers keep
-    it. overridable: parameters qos_overrides.TOPIC.subscription.* apply, and a reliability given there is kept.
+    is a publisher, '' for none. live: parameters qos_overrides.TOPIC.subscription.* apply, and a reliability given
+    there is kept; else it also takes what was sent before, if all publishers keep it.
     Call `look` in the executor's thread, `taken` before it, and one method at a time.
 
     name: of the topic after remapping. offered: the publishers, of any type, at the last look. problem: why they cannot
@@ -89,21 +94,18 @@ class FollowingSubscription:
         node: Node,
         topic: str,
         unfit: Callable[[str], str],
-        depth: int = DEPTH,
         *,
         first: str = "",
-        earlier: bool = True,
-        overridable: bool = False,
+        live: bool = False,
     ) -> None:
         self._node, self._topic, self._group = node, topic, NoExecutor()
-        self._unfit, self._first = unfit, first
-        self._depth, self._earlier = depth, earlier
+        self._unfit, self._first, self._live = unfit, first, live
         self.name = node.resolve_topic_name(topic)
         self.offered: list[TopicEndpointInfo] = []
         self.problem = ""
         self.heard = monotonic()
         self.lost = 0
-        self._overriding = _overriding(node, self.name) if overridable else None
+        self._overriding = _overriding(node, self.name) if live else None
         self._subscription: Subscription | None = None
         self._profile: tuple[Any, ...] = ("",)
         self._last: int | None = None  # number of the last message
@@ -143,7 +145,7 @@ class FollowingSubscription:
     def _follow(self, kind: str, publishers: Sequence[TopicEndpointInfo]) -> str:
         """Subscribe to a type as these publishers offer it, reliable without any; returns why it is not possible."""
         offered = [publisher.qos_profile for publisher in publishers]
-        profile = common_profile(offered, self._depth, self._earlier)
+        profile = common_profile(offered, earlier=not self._live)
         wanted = kind, profile.durability, profile.reliability
         if wanted == self._profile:
             return ""
@@ -188,6 +190,23 @@ class FollowingSubscription:
         last, self._last = self._last, number
         if last is not None and number > last + 1 and self._alone and self._node.count_publishers(self.name) == 1:
             self.lost += number - last - 1
+
+
+def check_sources(topics: Topics) -> None:
+    """Raise RequestError that names the parameter, its value and what is accepted, for names that are not valid."""
+    scalars: set[str] = set()
+    for name, source in sources_of(topics):
+        frame = ", or a frame as in /tf:tool0" if name not in ("wrench", COVARIATE) else ""
+        accepted = f"a topic, or a topic and a field as in /odom.pose.pose{frame}"
+        try:
+            validate_topic_name(source.topic)
+        except InvalidTopicNameException as error:
+            raise RequestError(source.key, source.text, f"{accepted} ({' '.join(str(error).split())})") from None
+        if source.topic.startswith("~") or source.text.endswith(".") or not source.frame_fits(bool(frame)):
+            raise RequestError(source.key, source.text, accepted)
+        if name == COVARIATE and name_of(source) in scalars:
+            raise RequestError(source.key, source.text, "each topic or field once")
+        scalars |= {name_of(source)} if name == COVARIATE else set()
 
 
 def _overriding(node: Node, name: str) -> QoSOverridingOptions:

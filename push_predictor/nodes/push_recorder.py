@@ -20,17 +20,15 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from rclpy.validate_topic_name import validate_topic_name
 
 from msg_adapters.diagnostics import diagnostic_array, diagnostic_status
 from push_predictor.errors import PushPredictorError, RequestError
 from push_predictor.nodes.parameter_tables import PUSH_RECORDER
 from push_predictor.nodes.parameters import declare, values_of
-from push_predictor.nodes.polling import ONE_TYPE, FollowingSubscription
-from push_predictor.nodes.qos import DEEPEST, common_profile, message_class
+from push_predictor.nodes.polling import ONE_TYPE, FollowingSubscription, check_sources
+from push_predictor.nodes.qos import common_profile, message_class
 from push_predictor.nodes.rig_source import RigSource
 from push_predictor.nodes.runtime import Stop, run
 from push_predictor.online.live_recording import LiveRecording
@@ -104,7 +102,7 @@ class RecorderSubscriptions:
     def __init__(self, node: Node, recording: LiveRecording) -> None:
         self._node, self._recording = node, recording
         names = [topic.name for topic in recording.wanted]
-        self._topics = {name: FollowingSubscription(node, name, partial(self._unfit, name), DEEPEST) for name in names}
+        self._topics = {name: FollowingSubscription(node, name, partial(self._unfit, name)) for name in names}
         self._looked = 0.0
 
     def look(self) -> None:
@@ -184,16 +182,9 @@ def new_recording(node: Node, values: Mapping[str, Any]) -> LiveRecording:
     if path.exists() and not values["force"]:
         raise RequestError("bag", str(path), "a path that does not exist, or force (option --force) to replace it")
     given = topics_of(values).over(load_topics(path))
-    topics = resolved(given, lambda topic: _full_name(node, topic))
+    check_sources(given)
+    topics = resolved(given, node.resolve_topic_name)
     return LiveRecording(path, topics, monotonic(), with_wrench=bool(given.wrench))
-
-
-def _full_name(node: Node, topic: str) -> str:
-    try:
-        validate_topic_name(topic)
-        return str(node.resolve_topic_name(topic))
-    except InvalidTopicNameException as error:
-        raise RequestError("topic", topic, f"a topic's name ({' '.join(str(error).split())})") from None
 
 
 def record(args: Sequence[str] | None = None) -> tuple[int, Progress | None]:

@@ -32,7 +32,7 @@ def replay_profile(recorded: str, kept: bool = False) -> QoSProfile:
     return QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
 
 
-def common_profile(publishers: Sequence[QoSProfile], depth: int = DEPTH, earlier: bool = True) -> QoSProfile:
+def common_profile(publishers: Sequence[QoSProfile], earlier: bool = True) -> QoSProfile:
     """The QoS that all publishers offer, reliable and volatile without any.
 
     earlier: ask for messages that were sent before, if all publishers keep them.
@@ -40,7 +40,7 @@ def common_profile(publishers: Sequence[QoSProfile], depth: int = DEPTH, earlier
     kept = earlier and all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in publishers)
     reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in publishers)
     return QoSProfile(
-        depth=depth,
+        depth=DEEPEST,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if kept and publishers else DurabilityPolicy.VOLATILE,
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
     )

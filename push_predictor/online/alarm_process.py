@@ -9,19 +9,16 @@ Scoring a push takes tenths of a second, calibrating on the training pushes seco
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from push_predictor.errors import RequestError
 from push_predictor.evaluation.alarm.evidence import AlarmState, alarm_json
 from push_predictor.evaluation.alarm.scores import AlarmMonitor, calibrate
-from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
-from push_predictor.online.child_process import Child
+from push_predictor.online.child_process import Child, Failure
 from push_predictor.recordings.table import PushTable, concatenate
-from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array
 
 if TYPE_CHECKING:
@@ -35,7 +32,6 @@ class _Reply:
     run: int
     state: AlarmState | None = None
     fired: int | None = None
-    off: str = ""
     skipped: tuple[str, ...] = ()
 
 
@@ -88,16 +84,16 @@ class AlarmProcess:
 
     def work(self) -> None:
         """Send the pushes that wait, take the replies."""
-        try:
-            while (reply := self._child.received()) is not None:
-                self._asked = False
+        while (reply := self._child.received()) is not None:
+            self._asked = False
+            if isinstance(reply, Failure):
+                self.stop()
+                self.off = reply.reason
+            else:
                 self._take(reply)
-            if self._waiting and not self._asked:
-                self._child.send((self._run, self._waiting))
-                self._waiting, self._asked = [], True
-        except (EOFError, OSError):
-            self.stop()
-            self.off = "the process of the alarm ended"
+        if self._waiting and not self._asked:
+            self._child.send((self._run, self._waiting))
+            self._waiting, self._asked = [], True
 
     def stop(self) -> None:
         """End the process."""
@@ -105,9 +101,7 @@ class AlarmProcess:
         self._asked, self._waiting = False, []
 
     def _take(self, reply: _Reply) -> None:
-        self.off = reply.off
-        if self.off:
-            self.stop()
+        self.off = ""
         if reply.run != self._run:
             return
         self.skipped += reply.skipped
@@ -118,21 +112,14 @@ class AlarmProcess:
 
 def _work(connection: Connection, model: PushModel, rate: float) -> None:
     """Calibrate on the training pushes, then score every batch of pushes that arrives; the process runs this."""
-    try:
-        calibration = calibrate(model)
-    except RequestError as error:
-        connection.send(_Reply(0, off=str(error)))
-        return
-    connection.send(_Reply(0))
-    monitor, current = AlarmMonitor(calibration, rate), 0
-    try:
-        while True:
-            run, pushes = connection.recv()
-            if run != current:
-                monitor, current = AlarmMonitor(calibration, rate), run
-            connection.send(_reply(monitor, run, pushes))
-    except (EOFError, OSError):
-        return  # the node has ended
+    calibration, current = calibrate(model), 0
+    monitor = AlarmMonitor(calibration, rate)
+    connection.send(_Reply(current))
+    while True:
+        run, pushes = connection.recv()
+        if run != current:
+            monitor, current = AlarmMonitor(calibration, rate), run
+        connection.send(_reply(monitor, run, pushes))
 
 
 def _reply(monitor: AlarmMonitor, run: int, pushes: list[CompletedPush]) -> _Reply:
@@ -151,45 +138,3 @@ class CompletedPush:
     mean: Array
     covariance: Array
     end: int
-
-
-@dataclass
-class _OpenPush:
-    """A push: its predicted windows by number, and the numbers that are neither predicted nor refused yet."""
-
-    predicted: dict[int, tuple[PushWindow, Prediction]] = field(default_factory=dict)
-    missing: set[int] = field(default_factory=set)
-
-
-class CompletedPushes:
-    """Collects the windows of the main model until their push is complete."""
-
-    def __init__(self) -> None:
-        self._open: dict[str, _OpenPush] = {}  # by name, in order
-
-    def found(self, number: int, window: PushWindow) -> None:
-        """Note that a window was found."""
-        self._open.setdefault(window.push_id, _OpenPush()).missing.add(number)
-
-    def answered(self, number: int, window: PushWindow, prediction: Prediction | None) -> None:
-        """Note that a window was predicted, or (None) refused; without effect if its push was taken without it."""
-        push = self._open.get(window.push_id, _OpenPush())
-        push.missing.discard(number)
-        if prediction is not None:
-            push.predicted[number] = (window, prediction)
-
-    def take(self, last: bool = False) -> list[CompletedPush]:
-        """Remove and return the complete pushes: another was found since. last: neither windows nor answers follow."""
-        done = []
-        while self._open and (last or (len(self._open) > 1 and not next(iter(self._open.values())).missing)):
-            push = self._open.pop(next(iter(self._open)))
-            if push.predicted:
-                done.append(_completed(push))
-        return done
-
-
-def _completed(push: _OpenPush) -> CompletedPush:
-    rows = [push.predicted[number] for number in sorted(push.predicted)]
-    windows = [window for window, _ in rows]
-    mean, covariance = np.stack([p.mean[0] for _, p in rows]), np.stack([p.covariance[0] for _, p in rows])
-    return CompletedPush(windows_to_table(windows), mean, covariance, windows[-1].end)

@@ -11,8 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.errors import PushPredictorError
-from push_predictor.online.child_process import Child
+from push_predictor.online.child_process import Child, Failure
 from push_predictor.recordings.checks.finding import Finding
 from push_predictor.recordings.decoder.decoder import Samples
 from push_predictor.recordings.rig import Rig
@@ -62,15 +61,11 @@ class CheckProcess:
 
     def work(self) -> None:
         """Take the result if it is there."""
-        try:
-            reply = self._child.received()
-        except (EOFError, OSError):
-            reply = "the process of the check ended"
-        if reply is None:
+        if (reply := self._child.received()) is None:
             return
         self.stop()
-        if isinstance(reply, str):
-            self.skip(reply)
+        if isinstance(reply, Failure):
+            self.skip(reply.reason)
             return
         self.failure = ""
         self.findings = tuple(finding for finding in reply if finding.severity != "note")
@@ -89,11 +84,8 @@ def _check(connection: Connection, data: Recording | Path, rig: Rig | None, topi
     from push_predictor.recordings.checks.check import check_recording
     from push_predictor.recordings.read import read_recording, require_rig
 
-    try:
-        recording = read_recording(data, rig=rig, topics=topics) if isinstance(data, Path) else data
-        connection.send(check_recording(recording, rig or require_rig(recording)))
-    except (PushPredictorError, OSError) as error:
-        connection.send(" ".join(str(error).split()))
+    recording = read_recording(data, rig=rig, topics=topics) if isinstance(data, Path) else data
+    connection.send(check_recording(recording, rig or require_rig(recording)))
 
 
 class SampleCheck:

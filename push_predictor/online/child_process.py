@@ -10,14 +10,26 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+from push_predictor.error_codes import ErrorCode, error_code
+from push_predictor.errors import PushPredictorError
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.process import BaseProcess
 
 NICENESS = 5  # samples and predictions come first; on a busy machine a lower priority would never be served
+
+
+@dataclass(frozen=True)
+class Failure:
+    """The reason why a process has no result, on one line, and its error code."""
+
+    reason: str
+    code: ErrorCode
 
 
 class Child:
@@ -70,16 +82,23 @@ class Child:
         self.process, self._pipe = process, ours
 
     def send(self, message: Any) -> None:
-        """Send a message to the started process. Raises OSError if it has ended."""
+        """Send a message to the started process; it is lost if that has ended."""
         assert self._pipe is not None
-        self._pipe.send(message)
+        with suppress(OSError):
+            self._pipe.send(message)
 
     def received(self, patience: float = 0.0) -> Any:
         """The next message, None if none comes within so many s, and without a process.
 
-        Raises EOFError or OSError if the process has ended.
+        A Failure if the work raised PushPredictorError or OSError, or the process has ended.
         """
-        return self._pipe.recv() if self._pipe is not None and self._pipe.poll(patience) else None
+        try:
+            return self._pipe.recv() if self._pipe is not None and self._pipe.poll(patience) else None
+        except (EOFError, OSError):
+            status = self.status(5.0)
+            how = f"signal {-status}" if status < 0 else f"status {status}"
+            reason = f"the process of the {self._name} ended with {how} and no result, see the log of the node"
+            return Failure(reason, ErrorCode.INTERNAL_ERROR)
 
     def stop(self, at_once: bool = False) -> None:
         """End the process, if there is one; at_once: by SIGKILL."""
@@ -112,7 +131,16 @@ def _not_interrupted() -> Iterator[None]:
 
 def _begin(work: Callable[..., None], pipe: Connection, *arguments: Any) -> None:
     os.nice(NICENESS)
-    work(pipe, *arguments)
+    with suppress(EOFError, OSError):  # the node has ended
+        attempt(work, pipe, *arguments)
+
+
+def attempt(work: Callable[..., None], pipe: Connection, *arguments: Any) -> None:
+    """Do the work of a child; an expected error becomes a message."""
+    try:
+        work(pipe, *arguments)
+    except (PushPredictorError, OSError) as error:
+        pipe.send(Failure(" ".join(str(error).split()), error_code(error)))
 
 
 def kill_children() -> None:

@@ -168,7 +168,7 @@ class LiveRecording:
 
     def _problems(self, now: float, ended: bool) -> dict[str, str]:
         found = {} if self._rig is not None else {"rig": NO_RIG}
-        found |= self._noted | (self._never_heard() if ended else self._silent(now))
+        found |= self._noted | self._missing(now, ended)
         found |= {
             f"{topic} lost": f"{topic}: {lost} messages were lost before they arrived."
             for topic, lost in self._lost.items()
@@ -176,22 +176,22 @@ class LiveRecording:
         }
         return found | {f"{name} samples": text for name, text in self._findings.problems.items()}
 
-    def _silent(self, now: float) -> dict[str, str]:
-        """The topics without publisher and the streams without messages, except those that nobody expects."""
-        heard = self._messages
-        missed = {t.name for t in self.wanted if (t.expected or heard[t.name]) and not t.static}
-        found = {topic: f"No publisher of {topic}." for topic in sorted(missed & self._unpublished)}
-        known = found.keys() | self._noted.keys()
-        for pace in self._findings.paces:
-            if pace.topic in missed - known and (quiet := pace.silent(now)):
-                found[f"{pace.source} silent"] = f"No message on {pace.source} for {quiet:.0f} s."
+    def _missing(self, now: float, ended: bool) -> dict[str, str]:
+        """The expected topics without publisher or messages; after the end only those without any message."""
+        found: dict[str, str] = {}
+        for topic in self.wanted:
+            name, heard = topic.name, self._messages[topic.name]
+            if name in self._noted or not (topic.expected or heard) or (heard if ended else topic.static):
+                continue
+            if name in self._unpublished:
+                found[name] = f"No publisher of {name}."
+            elif ended:
+                found[name] = f"No message on {name}."
+            else:
+                for pace in self._findings.paces:
+                    if pace.topic == name and (quiet := pace.silent(now)):
+                        found[f"{pace.source} silent"] = f"No message on {pace.source} for {quiet:.0f} s."
         return found
-
-    def _never_heard(self) -> dict[str, str]:
-        """The expected topics without any message."""
-        silent = [t.name for t in self.wanted if t.expected and not self._messages[t.name]]
-        why = {topic: "No publisher of" if topic in self._unpublished else "No message on" for topic in silent}
-        return {topic: f"{why[topic]} {topic}." for topic in silent if topic not in self._noted}
 
 
 class Findings:

@@ -12,6 +12,7 @@ import sys
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from math import isnan, nan
 from pathlib import Path
 from typing import NamedTuple, TypeAlias, overload
 
@@ -24,12 +25,15 @@ from push_predictor.evaluation.validation import Comparison, comparison_of, metr
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.predictors.tails import Tails, half_widths
 from push_predictor.models.push_model import PushModel
+from push_predictor.online.alarm_process import CompletedPush
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.table import OUTPUTS
 from push_predictor.recordings.windows.push_window import PushWindow, windows_to_table
 from push_predictor.types import Array, BoolArray, IntArray
 
 MAIN_RESULT = "validation.json"
+WIDTH = 13  # numbers of an answer: mean, covariance, whether in the domain
+_NO_ANSWER = array("d", [nan] * WIDTH)
 _Row: TypeAlias = tuple[str, int, int, int, tuple[str, ...], bytes]  # names of covariates; all other numbers
 
 
@@ -63,39 +67,59 @@ class LiveValidation:
         self.windows = WindowRows()
         self.scores = tuple(RunningScore(model.training_mean, model.predictor.tails) for model in self.models)
         self._answers = tuple(_Answers() for _ in self.models)
-        self._refused: tuple[list[tuple[int, str]], ...] = tuple([] for _ in self.models)
+        self._open: dict[str, list[int]] = {}  # numbers of the windows of the pushes that are not completed, in order
 
     def add(self, window: PushWindow) -> int:
         """Add a window; returns its number."""
+        number = len(self.windows)
         self.windows.append(window)
-        return len(self.windows) - 1
+        self._open.setdefault(window.push_id, []).append(number)
+        for answers in self._answers:
+            answers.expect()
+        return number
 
     def record(self, model: int, number: int, prediction: Prediction) -> None:
         """Record a model's prediction (n = 1) of a window; once for each."""
-        window, mean, covariance = self.windows[number], prediction.mean[0], prediction.covariance[0]
-        self._answers[model].add(number, mean, covariance, bool(prediction.in_domain[0]))
-        self.scores[model].add(window.push_id, mean, covariance, window.displacement)
+        window = self.windows[number]
+        self._answers[model].put(number, prediction)
+        self.scores[model].add(window.push_id, prediction.mean[0], prediction.covariance[0], window.displacement)
 
     def refuse(self, model: int, number: int, reason: str) -> None:
         """Record that a model was refused a window, and why."""
-        self._refused[model].append((number, reason))
+        self._answers[model].refused[number] = reason
+
+    def completed(self, last: bool = False) -> list[CompletedPush]:
+        """The pushes since the last call whose windows the main model has all predicted or was refused.
+
+        One is complete once another was found since; last: there will be neither windows nor answers.
+        """
+        done = []
+        while self._open and (last or (len(self._open) > 1 and self._settled(next(iter(self._open.values()))))):
+            numbers, mean, covariance, _ = self._answers[0].of(self._open.pop(next(iter(self._open))))
+            if len(numbers):
+                windows = self.windows.take(numbers)
+                done.append(CompletedPush(windows_to_table(windows), mean, covariance, windows[-1].end))
+        return done
+
+    def _settled(self, numbers: Iterable[int]) -> bool:
+        return all(self._answers[0].settled(number) for number in numbers)
 
     def predicted(self, model: int = 0) -> WindowRows:
         """The windows that a model has predicted, in order."""
-        return self.windows.take(self._answers[model].sorted()[0])
+        return self.windows.take(self._answers[model].predicted())
 
     def refused(self, model: int = 0) -> list[Refusal]:
         """The windows that a model was refused, in order."""
-        pairs = sorted(self._refused[model])
+        pairs = sorted(self._answers[model].refused.items())
         return [Refusal(self.windows[k].push_id, self.windows[k].index, reason) for k, reason in pairs]
 
     def unanswered(self, model: int = 0) -> int:
         """How many windows were neither predicted nor refused."""
-        return len(self.windows) - len(self._answers[model]) - len(self._refused[model])
+        return sum(not self._answers[model].settled(number) for number in range(len(self.windows)))
 
     def comparison(self, model: int = 0) -> Comparison:
         """Predicted and observed outcomes of the windows that a model has predicted."""
-        numbers, mean, covariance, _ = self._answers[model].sorted()
+        numbers, mean, covariance, _ = self._answers[model].of(self._answers[model].predicted())
         table = self.models[model].continued(windows_to_table(self.windows.take(numbers)))
         return comparison_of(self.models[model], table, mean, covariance)
 
@@ -107,10 +131,10 @@ class LiveValidation:
 
     def residuals(self) -> Iterator[Residual]:
         """Every prediction, in the order of the windows."""
-        answers = [zip(*stored.sorted(), strict=True) for stored in self._answers]
-        rows = [(number, k, *rest) for k, each in enumerate(answers) for number, *rest in each]
-        for number, k, mean, covariance, in_domain in sorted(rows, key=lambda row: row[:2]):
-            yield Residual(self.names[k], self.windows[number], mean, covariance, bool(in_domain))
+        for number, window in enumerate(self.windows):
+            for name, answers in zip(self.names, self._answers, strict=True):
+                for mean, covariance, in_domain in zip(*answers.of([number])[1:], strict=True):
+                    yield Residual(name, window, mean, covariance, bool(in_domain))
 
     def write(self, folder: Path) -> list[Path]:
         """Write validation.json of the main model, validation_NAME.json of the others, and their windows one by one.
@@ -170,24 +194,35 @@ class WindowRows(Sequence[PushWindow]):
 
 
 class _Answers:
-    """Means, covariances and whether in the domain, by number of window."""
+    """Of one model to each window, by number; refused: the reasons for windows that it was refused."""
 
     def __init__(self) -> None:
-        self._numbers, self._values = array("q"), array("d")
+        self._values = array("d")
+        self.refused: dict[int, str] = {}
 
-    def __len__(self) -> int:
-        return len(self._numbers)
+    def expect(self) -> None:
+        """Make room for the answer to a further window."""
+        self._values.extend(_NO_ANSWER)
 
-    def add(self, number: int, mean: Array, covariance: Array, in_domain: bool) -> None:
-        self._numbers.append(number)
-        self._values.extend([*mean.tolist(), *covariance.ravel().tolist(), float(in_domain)])
+    def put(self, number: int, prediction: Prediction) -> None:
+        """Take a prediction (n = 1)."""
+        numbers = [*prediction.mean[0].tolist(), *prediction.covariance[0].ravel().tolist()]
+        self._values[number * WIDTH : (number + 1) * WIDTH] = array("d", [*numbers, float(prediction.in_domain[0])])
 
-    def sorted(self) -> tuple[IntArray, Array, Array, BoolArray]:
-        """Numbers (n,), means (n, 3), covariances (n, 3, 3), whether in the domain (n,), by number."""
-        numbers, values = np.array(self._numbers, np.int64), np.array(self._values).reshape(-1, 13)
-        order = np.argsort(numbers)
-        values = values[order]
-        return numbers[order], values[:, :3], values[:, 3:12].reshape(-1, 3, 3), values[:, 12] > 0.0
+    def settled(self, number: int) -> bool:
+        """Whether a window is predicted or refused."""
+        return number in self.refused or not isnan(self._values[number * WIDTH])
+
+    def predicted(self) -> list[int]:
+        """The numbers of the windows with a prediction."""
+        return [number for number, first in enumerate(self._values[::WIDTH]) if not isnan(first)]
+
+    def of(self, numbers: Iterable[int]) -> tuple[IntArray, Array, Array, BoolArray]:
+        """Numbers (n,), means (n, 3), covariances (n, 3, 3), whether in the domain (n,) of the predicted ones."""
+        known = np.array([number for number in numbers if not isnan(self._values[number * WIDTH])], np.int64)
+        rows = [self._values[number * WIDTH : (number + 1) * WIDTH] for number in known.tolist()]
+        values = np.array(rows).reshape(-1, WIDTH)
+        return known, values[:, :3], values[:, 3:12].reshape(-1, 3, 3), values[:, 12] > 0.0
 
 
 def _file_name(name: str) -> str:

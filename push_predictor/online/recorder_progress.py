@@ -13,6 +13,7 @@ from typing import TextIO
 
 import numpy as np
 
+from push_predictor.online.news import News
 from push_predictor.recordings.decoder.sources import STREAMS
 from push_predictor.types import IntArray
 
@@ -152,19 +153,15 @@ class LiveLine:
     def __init__(self, inform: Callable[[str], None], warn: Callable[[str], None], stream: TextIO = sys.stderr) -> None:
         self._inform, self._warn, self._stream = inform, warn, stream
         self._terminal = stream.isatty()
-        self._before: set[str] = set()
-        self._warned: set[str] = set()
+        self._news = News()
         self._logged = -LOG_PERIOD
 
     def show(self, progress: Progress, now: float) -> None:
         """Show the progress at a time (s); call it once a second."""
-        present = progress.problems
-        if new := [key for key in present if key in self._before - self._warned]:
+        if new := self._news.of(dict.fromkeys(progress.problems, "")):
             self.clear()
             for key in new:
-                self._warn(present[key])
-        self._warned = (self._warned | {*new}) & present.keys()
-        self._before = {*present}
+                self._warn(progress.problems[key])
         if self._terminal:
             width = shutil.get_terminal_size().columns - 1
             self._write(_ERASE + _cut(progress.to_line(), width))

@@ -9,7 +9,7 @@ In a fast replay the middleware may delay one of them.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import monotonic
 
@@ -26,15 +26,15 @@ SAME_CLOCK = 10.0  # s; a greater latency means that the stamps are of another c
 PATIENCE = 5.0  # s of waiting for a stream that lags behind
 # ns; the finder proceeds without a stream that lags by twice as much
 SENSOR_LAG, SCALAR_LAG = 0.5e9 * LONGEST_LAG, 0.5 * LONGEST_GAP
-SILENT = 2.0  # s without a sample after which a stream is called silent
 LAGS = 50  # portions of a stream over which its stamps are compared with the slider's
 
 
 @dataclass(frozen=True)
 class TopicReport:
-    """What is known of a topic. stream: slider, pusher or wrench; kind: the message type; reliability: '' without one.
+    """What is known of a topic. stream: slider, pusher, wrench or the name of a scalar; kind: the message type.
 
-    refused: whether the topic cannot be used as it is. figures: in words, empty before enough messages came.
+    reliability: '' without a subscription. refused: whether a sensor's topic cannot be used as it is. figures: in
+    words, empty before enough messages came.
     """
 
     stream: str
@@ -78,28 +78,6 @@ def stamp_figures(stamp: IntArray, received: IntArray | None) -> str:
     )
 
 
-class ReportLog:
-    """Which reports are news: a report is logged when it differs from the one before, and stays so for a second look.
-
-    A refusal is logged at once.
-    """
-
-    def __init__(self) -> None:
-        self._logged: dict[str, tuple[object, ...]] = {}
-        self._seen: dict[str, tuple[object, ...]] = {}
-
-    def news(self, reports: Iterable[TopicReport]) -> list[TopicReport]:
-        """The reports to log now."""
-        found = []
-        for report in reports:
-            stable = self._seen.get(report.stream) == report.key
-            self._seen[report.stream] = report.key
-            if (stable or report.refused) and self._logged.get(report.stream) != report.key:
-                self._logged[report.stream] = report.key
-                found.append(report)
-        return found
-
-
 class StreamSync:
     """Records for each stream its newest stamp, and since when it lags behind the foremost sensor.
 
@@ -110,7 +88,6 @@ class StreamSync:
         self._sensors: dict[str, int] = {}  # newest stamp (ns)
         self._scalars: dict[str, int | None] = dict.fromkeys(scalars)
         self._together = dict.fromkeys(scalars, monotonic())
-        self._heard: dict[str, float] = {}  # when a sensor's last sample came
         self._lags: dict[str, deque[float]] = {}  # s, of the other sensors' stamps from the slider's
 
     def note(self, samples: Samples) -> None:
@@ -118,7 +95,6 @@ class StreamSync:
         stamps = {"slider": samples.slider.stamp, "pusher": samples.pusher.stamp, "wrench": samples.wrench.stamp}
         newest = {name: int(stamp[-1]) for name, stamp in stamps.items() if len(stamp)}
         self._sensors |= newest
-        self._heard |= dict.fromkeys(newest, monotonic())
         for name in newest.keys() - {"slider"}:
             if "slider" in self._sensors:
                 lag = 1e-9 * (newest[name] - self._sensors["slider"])
@@ -138,20 +114,11 @@ class StreamSync:
         nearest = {name: min(lags, key=abs) for name, lags in self._lags.items() if len(lags) == LAGS}
         return {name: lag for name, lag in nearest.items() if abs(lag) > CLOCK_TOLERANCE}
 
-    def silent(self) -> list[str]:
-        """The sensors that have stopped while others continue."""
-        newest = max(self._heard.values(), default=0.0)
-        return [name for name, heard in self._heard.items() if newest - heard > SILENT]
-
     @property
     def with_wrench(self) -> bool:
         """Whether a wrench was received."""
-        return "wrench" in self._heard
+        return "wrench" in self._sensors
 
     def problems(self) -> list[str]:
         """What keeps windows from being found, in words."""
-        found = [describe_clock_offset(name, lag) for name, lag in self.apart().items()]
-        return found + [
-            f"No sample from the {name} for {SILENT:g} s, others continue: no window can be found."
-            for name in self.silent()
-        ]
+        return [describe_clock_offset(name, lag) for name, lag in self.apart().items()]

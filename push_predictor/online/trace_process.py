@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.rig import HOW_TO_GIVE
@@ -23,6 +22,7 @@ from push_predictor.recordings.rig import HOW_TO_GIVE
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
+    from push_predictor.models.push_model import PushModel
     from push_predictor.residuals.outcome import Trace
 
 REPORT, VERDICT, EXTENDED = "trace.html", "trace.json", "extended.pushmodel"
@@ -33,10 +33,10 @@ NOT_TRACED = ("residuals",)  # a validator's bag of push_residual contains no se
 
 @dataclass(frozen=True)
 class TraceTask:
-    """The pushes to trace, the model file, covariates (empty: all), the level alpha and the work folder."""
+    """The pushes to trace, the model or its file, covariates (empty: all), the level alpha and the work folder."""
 
     evidence: tuple[Path, ...]
-    model: Path
+    model: PushModel | Path
     covariates: tuple[str, ...]
     alpha: float
     folder: Path
@@ -59,22 +59,12 @@ class Traced:
     needs: tuple[str, ...] | None
 
 
-@dataclass(frozen=True)
-class Failed:
-    """The reason why there is no verdict, and its error code."""
-
-    reason: str
-    code: ErrorCode
-
-
 def run_trace(connection: Connection, task: TraceTask) -> None:
-    """Send Stage messages, then Traced or Failed; a Child runs this."""
+    """Send Stage messages, then Traced; a Child runs this. Raises PushPredictorError or OSError."""
     try:
         connection.send(_traced(connection, task))
     except (BrokenPipeError, ConnectionResetError):
         shutil.rmtree(task.folder, ignore_errors=True)  # the node has died and cannot do it
-    except (PushPredictorError, OSError) as error:
-        connection.send(Failed(_for_client(str(error), task), error_code(error)))
 
 
 def evidence_in(folder: Path) -> tuple[Path, ...]:
@@ -82,7 +72,7 @@ def evidence_in(folder: Path) -> tuple[Path, ...]:
 
     A validator's table comes first, then the folder itself as a recording, then all push tables and recordings in it.
     """
-    from push_predictor.online.window_table import TABLE
+    from push_predictor.online.run_files import TABLE
     from push_predictor.recordings.table_file import ENDINGS
 
     if (folder / TABLE).is_file():
@@ -99,7 +89,7 @@ def _is_bag(path: Path) -> bool:
     return (path / METADATA_FILE).is_file() and path.name not in NOT_TRACED
 
 
-def _for_client(text: str, task: TraceTask) -> str:
+def for_client(text: str, task: TraceTask) -> str:
     """A message on one line, with the paths and the advice that the action's client knows."""
     text = text.replace(str(task.folder / COPIES), str(task.evidence[0].parent))
     text = text.replace(str(task.folder), str(task.folder.parent))  # where the results would have been moved
@@ -127,7 +117,7 @@ def _traced(connection: Connection, task: TraceTask) -> Traced:
     if trace.extended is not None:
         save_model(trace.extended, task.folder / EXTENDED)
     sentences = [*answer(trace), rivals(trace), worth(trace), *_report(task.folder / REPORT, trace)]
-    sentences += [f"Warning: {_for_client(text, task)}" for text in warnings]
+    sentences += [f"Warning: {for_client(text, task)}" for text in warnings]
     return Traced(text, " ".join(filter(None, sentences)), None if trace.extended is None else trace.extended.needs)
 
 
@@ -144,7 +134,7 @@ def _report(path: Path, trace: Trace) -> Sequence[str]:
 
 def _settled(path: Path, folder: Path) -> Path:
     """A copy of a table that a validator may be appending to, without an incomplete last line; else the path itself."""
-    from push_predictor.online.window_table import TABLE
+    from push_predictor.online.run_files import TABLE
     from push_predictor.recordings.table_file import rig_path
 
     if path.name != TABLE:

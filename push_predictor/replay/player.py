@@ -59,9 +59,9 @@ class PlayerClock:
         """Continue from another recorded time."""
         self._recorded, self._at = recorded, self._wall.now()
 
-    def change(self, rate: float | None = None, paused: bool | None = None) -> None:
-        """Run at another rate, stop or go on, from the present recorded time."""
-        self.jump(self.now())
+    def change(self, recorded: int, rate: float | None = None, paused: bool | None = None) -> None:
+        """Run at another rate, stop or go on, from a recorded time."""
+        self.jump(recorded)
         self.rate = self.rate if rate is None else rate
         self.paused = self.paused if paused is None else paused
 
@@ -180,7 +180,7 @@ class ReplayPlayer:
         if not (math.isfinite(rate) and rate > 0.0):
             return False
         with self._control():
-            self._clock.change(rate=rate)
+            self._clock.change(self._reached(), rate=rate)
         return True
 
     def play_next(self) -> bool:
@@ -253,13 +253,16 @@ class ReplayPlayer:
         return self._ahead is not None or self._start_at is not None or self.state in ("playing", "paused")
 
     def _now(self) -> int | None:
-        if (head := self._head()) is not None:
-            return min(self._clock.now(), head.log_time)
-        return self._time
+        return self._time if self._head() is None else self._reached()
+
+    def _reached(self) -> int:
+        """Recorded time, at most that of the next message: an overdue one is due now, not at another rate's time."""
+        head = self._head()
+        return self._clock.now() if head is None else min(self._clock.now(), head.log_time)
 
     def _set_paused(self, paused: bool) -> None:
         with self._control():
-            self._clock.change(paused=paused)
+            self._clock.change(self._reached(), paused=paused)
             self._announce()
 
     @contextmanager

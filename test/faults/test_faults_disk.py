@@ -27,7 +27,7 @@ from synthetic import noisy_pushes, square_rig
 from push_predictor.cli import main
 from push_predictor.commands.common import progress
 from push_predictor.commands.common.output import write_text
-from push_predictor.error_codes import ErrorCode
+from push_predictor.error_codes import ErrorCode, error_code
 from push_predictor.errors import RecordingError
 from push_predictor.evaluation.report.page import write_validation_report
 from push_predictor.evaluation.validation import compare
@@ -212,9 +212,9 @@ def test_a_trace_reports_which_result_could_not_be_written(
     place = tmp_path / "result" / ".trace-x"
     place.mkdir(parents=True)
     task = trace_process.TraceTask((tmp_path / "bag",), tmp_path / "m", (), 0.01, place)
-    pipe = Pipe()
-    with full_disk():
-        trace_process.run_trace(pipe, task)  # type: ignore[arg-type]  # a pipe that records what it sends
+    with full_disk(), pytest.raises(OSError, match="File too large") as failure:
+        trace_process.run_trace(Pipe(), task)  # type: ignore[arg-type]  # a pipe that records what it sends
     reason = f"[Errno 27] File too large: '{tmp_path}/result/trace.json'"
-    assert pipe.sent[-1] == trace_process.Failed(reason, ErrorCode.INVALID_FILE)
+    assert trace_process.for_client(str(failure.value), task) == reason
+    assert error_code(failure.value) == ErrorCode.INVALID_FILE
     assert not list(place.iterdir())

@@ -24,7 +24,6 @@ from validator_bench import Status, hosting_validator
 from msg_adapters import ns_to_stamp
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.online import stream_health
 from push_predictor.online.stream_health import LAGS, Samples, StreamSync
 from push_predictor.recordings.rig import save_rig
 from push_predictor.recordings.streams import PoseStream, Recording, WrenchStream
@@ -151,7 +150,7 @@ def test_every_fault_is_counted_by_kind_and_gives_no_window(tmp_path: Path) -> N
         assert values["streams resets"] == "2"  # between each two pushes
         assert int(values["slider dropouts"]) >= 1 + 2  # and one between each two pushes, which lie 10 s apart
         assert "1 samples with a stamp ahead" in status.message
-        silent = "No sample from the wrench for 2 s"
+        silent = "/pusher/wrench: No message for over 5 s."
         # The force sensor stops, the others continue.
         sensors.send(clean(10.0), ("slider", "pusher"), pause=0.3, until=lambda: silent in status.message)
         status.wait_for_message(silent)
@@ -192,16 +191,3 @@ def test_an_occasional_lag_is_not_a_clock_offset() -> None:
     for k in range(2 * LAGS):
         sync.note(portion(10 * k, 10 * k - (2000 if k % 10 else 0)))
     assert sync.apart() == {}
-
-
-def test_reports_a_sensor_that_stops(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [100.0]
-    monkeypatch.setattr(stream_health, "monotonic", lambda: now[0])
-    sync = StreamSync()
-    sync.note(portion(0, 0))
-    now[0] += 3.0
-    assert sync.silent() == [], "all have stopped: a pause"
-    none = rows(clean(0.0).pusher, np.arange(0))
-    sync.note(replace(portion(10, 10), pusher=none))
-    assert sync.silent() == ["pusher"]
-    assert "No sample from the pusher" in sync.problems()[0]

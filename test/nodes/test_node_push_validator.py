@@ -590,6 +590,7 @@ def test_a_validator_without_samples_refuses_a_wrong_type_and_states_at_its_end_
         status, wrong = Status(node), node.create_publisher(JointState, "slider/pose", 10)
         status.wait_for_message("is of type 'sensor_msgs/msg/JointState', which has no pose")
         assert status.all[-1][0] == DiagnosticStatus.ERROR
+        process.wait_for_text("which has no pose", 30.0)
         node.destroy_publisher(wrong)
         status.wait_for_message("/slider/pose: No publisher.")
         assert process.stop() == 0, process.text()

@@ -32,7 +32,7 @@ from push_predictor.models.effects.effect import Effect
 from push_predictor.models.predictors import ExtendedPredictor
 from push_predictor.models.store.model_file import save_model
 from push_predictor.models.train import train_model
-from push_predictor.nodes.validator.scalar_topics import ScalarTopics
+from push_predictor.nodes.validator.scalar_topics import ClockTopic, ScalarTopic
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.bag.reader import open_bag
 from push_predictor.recordings.decoder.decoder import StreamDecoder
@@ -152,14 +152,15 @@ def test_a_model_that_needs_a_topic_scores_as_offline(watched: Watched, model: P
 
 def test_topics_without_samples_are_named(watched: Watched) -> None:
     for topic in (*OURS, "/nowhere"):
-        assert f"Scalar topic {topic} has no publisher." in watched.before
-    assert "Scalar topic /nowhere has no publisher." in watched.message
+        assert f"{topic}: No publisher." in watched.before
+    assert "/nowhere: No publisher." in watched.message
     wrong = "covariate_topics 'rod/name': rod/name is of type 'std_msgs/msg/String'; no field of it is a number"
     assert any(wrong in message for message in watched.messages), "while it was published"
-    assert not any(f"Scalar topic {topic}" in watched.message for topic in OURS)
+    assert any(not any(topic in message for topic in OURS) for message in watched.messages), "while they were"
     counts = [int(watched.values[f"topic:{topic} samples"]) for topic in OURS]
     assert counts[0] > 100 > counts[1] > counts[2] > 1
-    assert not {key: v for key, v in watched.values.items() if "rejected" in key and key.startswith("topic:")}
+    assert [watched.values[f"topic:{topic} rejected"] for topic in OURS] == ["0"] * len(OURS)
+    assert watched.values[f"topic:{OURS[0]} topic"].startswith(f"topic:{OURS[0]}: {OURS[0]}, ")
 
 
 # --- the subscriber alone --------------------------------------------------------------------------------------------
@@ -183,17 +184,22 @@ def talker(domain: int) -> Iterator[Node]:
 
 
 class Subscriber:
-    """The scalar topics of a node without the sensors, and their decoder."""
+    """A scalar topic of a node without the sensors, and its decoder."""
 
-    def __init__(self, node: Node, *names: str) -> None:
-        self.decoder = StreamDecoder(Topics(covariates=names))
-        self.topics = ScalarTopics(node, self.decoder.scalars)
-        self.problems, self.figures = self.topics.problems, self.topics.figures
+    def __init__(self, node: Node, name: str) -> None:
+        self.decoder, self.clock = StreamDecoder(Topics(covariates=(name,))), ClockTopic(node)
+        ((key, self.own),) = self.decoder.scalars.items()
+        self.topic = ScalarTopic(node, key, self.own, self.clock.history)
+
+    @property
+    def problem(self) -> str:
+        return self.topic.report().problem
 
     def take(self, last: bool = False) -> dict[str, ScalarStream]:
-        self.topics.look()
-        self.topics.move()
-        self.topics.date(last)
+        for each in (self.topic, self.clock):
+            each.look()
+            each.move()
+        self.topic.date(last)
         return self.decoder.take_scalars(last=True)
 
 
@@ -231,16 +237,16 @@ def test_subscribes_to_a_later_topic_with_the_qos_of_its_publisher(
     listener: Node, talker: Node, profile: QoSProfile
 ) -> None:
     subscriber = Subscriber(listener, "warmth")
-    assert subscriber.take() == {} and "no publisher" in subscriber.problems()[0]
+    assert subscriber.take() == {} and subscriber.problem == "No publisher."
     gathered = Gathered(subscriber, "/warmth")
     with offered(talker, String, QoSProfile(depth=10)):
-        assert gathered.has(lambda _: "std_msgs/msg/String" in subscriber.problems()[0])
-        assert "covariate_topics 'warmth': " in subscriber.problems()[0]
+        assert gathered.has(lambda _: "std_msgs/msg/String" in subscriber.problem)
+        assert "covariate_topics 'warmth': " in subscriber.problem
     message = Temperature(temperature=21.5)
     message.header.stamp.sec = 7
     with offered(talker, Temperature, profile) as publisher:
         assert gathered.has(publishing(publisher, message, 21.5))
-        assert {*gathered.value} == {21.5} and {*gathered.stamp} == {7 * SECOND} and not subscriber.problems()
+        assert {*gathered.value} == {21.5} and {*gathered.stamp} == {7 * SECOND} and not subscriber.problem
     with offered(talker, Float32, profile) as publisher:
         assert gathered.has(publishing(publisher, Float32(data=0.5), 0.5)), "another type from now on"
 
@@ -271,14 +277,12 @@ def test_a_field_of_any_type_is_a_scalar(listener: Node, talker: Node) -> None:
     subscriber = Subscriber(listener, "warmth.position[1]")
     gathered = Gathered(subscriber, "/warmth.position[1]")
     with offered(talker, Temperature, QoSProfile(depth=10)):
-        assert gathered.has(
-            lambda _: "and has no number in field 'position[1]', give one of" in subscriber.problems()[0]
-        )
+        assert gathered.has(lambda _: "and has no number in field 'position[1]', give one of" in subscriber.problem)
     message = JointState(position=[0.5, 1.5])
     message.header.stamp.sec = 7
     with offered(talker, JointState, QoSProfile(depth=10)) as publisher:
         assert gathered.has(publishing(publisher, message, 1.5))
-        assert {*gathered.value} == {1.5} and {*gathered.stamp} == {7 * SECOND} and not subscriber.problems()
+        assert {*gathered.value} == {1.5} and {*gathered.stamp} == {7 * SECOND} and not subscriber.problem
 
 
 def test_without_a_clock_a_sample_is_dated_by_its_sending_time(listener: Node, talker: Node) -> None:
@@ -321,6 +325,6 @@ def test_stamps_of_another_clock_and_nan_are_rejected_and_counted(listener: Node
     subscriber.decoder.put(Messages.of("slider/pose", "geometry_msgs/msg/PoseStamped", [0], [here]))
     subscriber.decoder.take()
     gathered = Gathered(subscriber, "/warmth")
-    assert gathered.has(lambda _: subscriber.figures().get("topic:/warmth samples") == 3)
+    assert gathered.has(lambda _: subscriber.own.received == 3)
     assert gathered.value == [1.0]
-    assert "/warmth: 2 samples were rejected (not finite 1, another clock 1)." in subscriber.problems()
+    assert subscriber.own.rejected == {"not finite": 1, "another clock": 1}

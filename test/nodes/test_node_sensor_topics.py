@@ -27,8 +27,9 @@ from visualization_msgs.msg import Marker
 
 from msg_adapters import ns_to_stamp
 from push_predictor.errors import RequestError
+from push_predictor.nodes.polling import check_sources
 from push_predictor.nodes.validator import sensor_subscriber
-from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber, check_sources
+from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.recordings.topics import Topics
 
 pytestmark = pytest.mark.slow
@@ -266,9 +267,10 @@ def test_no_sample_is_lost_when_one_of_two_publishers_leaves(listener: Node, tal
     [
         (Topics(slider="1 pose"), "slider_topic: '1 pose'"),
         (Topics(pusher="~/pose"), "pusher_topic: '~/pose'"),
+        (Topics(pusher="/"), "pusher_topic: '/'"),
         (Topics(wrench="/tf:tool0"), "wrench_topic: '/tf:tool0'"),
         (Topics(slider="/tf:"), "slider_topic: '/tf:'"),
-        *((Topics(covariates=(name,)), f"covariate_topics: '{name}'") for name in ("~/x", "1 x", "/tf:x", "x.")),
+        *((Topics(covariates=(name,)), f"covariate_topics: '{name}'") for name in ("~/x", "1 x", "/tf:x", "x.", ".x")),
         (Topics(covariates=("x", "/x")), "covariate_topics: '/x'"),
     ],
 )
@@ -308,8 +310,7 @@ def test_samples_are_complete_when_every_topic_has_messages_or_after_a_second(mo
     slider: list[bytes] = []
     wrench: list[bytes] = []
     decoder = SimpleNamespace(poses={"slider": slider}, wrench=SimpleNamespace(messages=wrench))
-    scalars = SimpleNamespace(waiting=lambda: True)
-    sensors: Any = SimpleNamespace(decoder=decoder, _empty=0.0, _settled=True, _scalars=scalars)
+    sensors: Any = SimpleNamespace(decoder=decoder, _empty=0.0, _settled=True, _scalars=[])
     complete = SensorSubscriber.complete
     assert not complete(sensors), "no message yet"
     slider.append(b"pose")

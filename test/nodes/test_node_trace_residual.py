@@ -24,10 +24,11 @@ from lifecycle_msgs.msg import Transition
 from made_up_traces import made_up_trace, pushes, slippery
 from trace_bench import RIG, SLIDING, TraceServer, drifting_folder, trace_server_of
 
+from push_predictor.errors import PushPredictorError
 from push_predictor.models.store.model_file import load_model
 from push_predictor.nodes import predict_server
 from push_predictor.online import trace_process
-from push_predictor.online.trace_process import COPIES, EXTENDED, REPORT, VERDICT, Failed, TraceTask, evidence_in
+from push_predictor.online.trace_process import COPIES, EXTENDED, REPORT, VERDICT, TraceTask, evidence_in
 from push_predictor.recordings.table_file import read_table, write_table
 
 
@@ -167,10 +168,10 @@ def test_process_of_a_trace_reports_the_reason(
     task = TraceTask(
         (drifting / "pushes.csv",), place / "deployed.pushmodel", given.get("covariates", ()), 0.01, folder
     )
-    sent: list[Any] = []
-    trace_process.run_trace(SimpleNamespace(send=sent.append), task)
-    assert isinstance(sent[-1], Failed) and ".trace-" not in sent[-1].reason
-    assert all(word in sent[-1].reason for word in words), sent[-1].reason
+    with pytest.raises(PushPredictorError) as failure:
+        trace_process.run_trace(SimpleNamespace(send=lambda message: None), task)
+    reason = trace_process.for_client(str(failure.value), task)
+    assert ".trace-" not in reason and all(word in reason for word in words), reason
     assert {path.name for path in folder.iterdir()} <= {COPIES}
 
 

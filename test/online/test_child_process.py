@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from push_predictor.online.child_process import Child, kill_children
+from push_predictor.error_codes import ErrorCode
+from push_predictor.online.child_process import Child, Failure, kill_children
 
 
 def report(connection: Connection) -> None:
@@ -33,8 +34,8 @@ def test_no_sigint_reaches_a_child_and_the_parent_still_gets_it() -> None:
     assert child.received(60.0) == (True, False, os.environ["OPENBLAS_NUM_THREADS"])
     kill_children()
     assert child.status(60.0) == -signal.SIGKILL
-    with pytest.raises(EOFError):
-        child.received()
+    reason = "the process of the report ended with signal 9 and no result, see the log of the node"
+    assert child.received() == Failure(reason, ErrorCode.INTERNAL_ERROR)
 
 
 def test_an_alarm_during_the_start_of_a_child_waits_until_the_child_has_its_data(

@@ -57,6 +57,41 @@ def same_window(a: PushWindow, b: PushWindow) -> bool:
     )
 
 
+def test_a_push_is_complete_when_the_main_model_has_answered_and_another_has_begun(
+    models: dict[str, PushModel],
+) -> None:
+    live, windows = LiveValidation(models), made_up_windows(5)
+
+    def add(name: str, count: int) -> list[int]:
+        return [live.add(replace(windows[0], push_id=name)) for _ in range(count)]
+
+    def predicted(*numbers: int) -> None:
+        for number in numbers:
+            live.record(0, number, predict(live.models[0], live.windows[number]))
+
+    def completed(last: bool = False) -> list[tuple[str, int]]:
+        """Name and number of windows of each push."""
+        pushes = live.completed(last)
+        assert all(push.mean.shape == (len(push.windows), 3) and push.end == windows[0].end for push in pushes)
+        return [(push.windows.push_id[0], len(push.windows)) for push in pushes]
+
+    predicted(*add("a", 2))
+    assert completed() == [], "it may go on"
+    first, second = add("b", 2)
+    predicted(first)
+    assert completed() == [("a", 2)]
+    (only,) = add("c", 1)
+    assert completed() == [], "a window of b has no answer yet"
+    live.refuse(1, second, "another model")
+    assert completed() == []
+    live.refuse(0, second, "angle: 2.0 is not accepted")
+    assert completed() == [("b", 1)], "it was refused"
+    predicted(only)
+    assert completed(last=True) == [("c", 1)]
+    add("d", 1)
+    assert completed(last=True) == [], "never answered"
+
+
 # --- memory --------------------------------------------------------------------------------------------------------
 
 

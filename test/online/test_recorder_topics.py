@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from push_predictor.errors import RecordingError, RequestError
+from push_predictor.errors import RecordingError
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.decoder.sources import RecordedTopic, resolved, topics_to_record
 from push_predictor.recordings.topics import Topics
@@ -54,20 +54,6 @@ def test_names_are_resolved_and_fields_and_frames_stay() -> None:
     found = resolved(given, lambda name: name if name.startswith("/") else f"/cell/{name}")
     expected = Topics("/cell/slider/pose", "/tf:tool0", "/cell/netft.wrench", ("/cell/driver.currents[2]",), "map")
     assert found == expected
-
-
-@pytest.mark.parametrize(
-    ("given", "field"),
-    [
-        (Topics(slider="/tf:"), "slider_topic"),
-        (Topics(pusher="/"), "pusher_topic"),
-        (Topics(wrench="/tf:sensor"), "wrench_topic"),
-        (Topics(covariates=(".x",)), "covariate_topics"),
-    ],
-)
-def test_a_text_that_is_no_topic_is_refused(given: Topics, field: str) -> None:
-    with pytest.raises(RequestError, match=f"{field}: .* is not accepted, give TOPIC"):
-        resolved(given, str)
 
 
 def test_definitions_contain_each_inner_type_once(tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_predictor.online.stream_health import ReportLog, TopicReport, stamp_figures
+from push_predictor.online.news import News
+from push_predictor.online.stream_health import TopicReport, stamp_figures
 
 SECOND = 1_000_000_000
 REPORT = TopicReport("slider", "/vicon/block", "geometry_msgs/msg/PoseStamped", "best effort", ("world",))
@@ -66,19 +67,18 @@ def test_the_line_has_everything_that_is_known() -> None:
     )
 
 
-def test_a_change_that_stays_is_logged_once() -> None:
-    log = ReportLog()
-    assert [log.news([REPORT]) for _ in range(3)] == [[], [REPORT], []]
+def test_a_change_that_stays_is_news_once() -> None:
+    news = News()
+
+    def told(*reports: TopicReport) -> list[list[str]]:
+        return [news.of({report.stream: report.key}) for report in reports]
+
+    assert told(REPORT, REPORT, REPORT) == [[], ["slider"], []]
     faster = replace(REPORT, figures="100.0 Hz")
-    assert [log.news([report]) for report in (faster, REPORT, REPORT)] == [[], [], []], "it did not stay"
-    assert [log.news([faster]) for _ in range(3)] == [[], [faster], []]
-    assert log.news([replace(faster, figures="101.0 Hz")]) == [], "figures alone are no change"
-    wrong = replace(faster, problem="No publisher.")
-    assert [log.news([wrong]) for _ in range(3)] == [[], [wrong], []]
-    assert log.news([replace(faster, reliability="reliable")]) == []
-    assert len(log.news([replace(faster, reliability="reliable")])) == 1
-
-
-def test_a_refusal_is_logged_at_once_and_once() -> None:
-    log, refused = ReportLog(), replace(REPORT, refused=True, problem="is of another type")
-    assert [log.news([refused]) for _ in range(2)] == [[refused], []]
+    assert told(faster, REPORT, REPORT) == [[], [], []], "it did not stay"
+    assert told(faster, faster, faster) == [[], ["slider"], []]
+    assert told(replace(faster, figures="101.0 Hz")) == [[]], "figures alone are no change"
+    for other in (replace(faster, problem="No publisher."), replace(faster, reliability="reliable")):
+        assert told(other, other, other) == [[], ["slider"], []]
+    at_once = News(at_once=True)
+    assert [at_once.of(dict.fromkeys(present, "")) for present in ("a", "ab", "", "a")] == [["a"], ["b"], [], ["a"]]

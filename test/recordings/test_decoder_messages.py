@@ -19,6 +19,7 @@ from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder import topic_input
 from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder
 from push_predictor.recordings.decoder.topic_input import TopicInput
+from push_predictor.recordings.fields.sources import Columns, FieldReader
 from push_predictor.recordings.topics import Topics
 
 GOOD = [0.1, -0.2, 0.03, 0.0, 0.0, math.sin(0.3), math.cos(0.3)]
@@ -141,6 +142,22 @@ def test_decoded_messages_that_nobody_takes_are_dropped_too(monkeypatch: pytest.
         own.recent()
     assert len(own) == 100 and own.dropped == 205
     assert own.take().stamp.tolist() == [7_000_000_205 + k for k in range(100)]
+
+
+def test_messages_that_come_while_others_are_decoded_replace_the_oldest(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(topic_input, "LIMIT", 100)
+    own = slider_input(*(pose(*GOOD, nanosec=k) for k in range(100)))
+    read = FieldReader.read
+
+    def read_slowly(reader: FieldReader, messages: Messages) -> Columns:
+        monkeypatch.setattr(FieldReader, "read", read)
+        input_of(own, POSE_TYPE.name, *(pose(*GOOD, nanosec=k) for k in range(100, 110)))
+        return read(reader, messages)
+
+    monkeypatch.setattr(FieldReader, "read", read_slowly)
+    own.recent()
+    assert len(own) == 100 and own.dropped == 10
+    assert own.take().stamp.tolist() == [7_000_000_010 + k for k in range(100)]
 
 
 def test_a_bag_has_no_limit(monkeypatch: pytest.MonkeyPatch):

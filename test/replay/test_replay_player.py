@@ -134,6 +134,26 @@ def test_slow_publisher_delays_messages_and_loses_none() -> None:
     assert stage.player.published == 10
 
 
+@pytest.mark.parametrize("controls", [[("set_rate", 0.5)], ["pause", "resume", ("set_rate", 0.5)]])
+def test_at_another_rate_what_is_overdue_is_due_now(controls: list[Action]) -> None:
+    stage = Stage(TEN)
+    stage.cost = round(0.15 * SECOND)
+    prepare = stage.prepare
+
+    def hurried(message: RawMessage) -> Callable[[], bool]:
+        if message is TEN[5] and stage.cost:
+            stage.cost = 0
+            for control in controls:
+                stage.do(control)
+            assert stage.player.behind == 0
+        return prepare(message)
+
+    stage.player._output = PlayerOutput(hurried, lambda: None, stage.states.append)
+    stage.run()
+    assert stage.times[:6] == pytest.approx([0.15 * k for k in range(6)])
+    assert stage.times[5:] == pytest.approx([0.75 + 0.2 * k for k in range(5)])
+
+
 def test_the_player_says_how_far_it_is_behind() -> None:
     stage, seen = Stage(TEN), list[float]()
     stage.cost = round(0.15 * SECOND)

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from unittest.mock import patch
 
 from push_predictor.online import check_process
+from push_predictor.online.child_process import attempt
 
 
 class Here:
@@ -21,7 +22,7 @@ class Here:
         self.started = False
 
     def start(self, *arguments: object) -> None:
-        self._work(SimpleNamespace(send=self._sent.append), *arguments)
+        attempt(self._work, SimpleNamespace(send=self._sent.append), *arguments)
         self.started = True
 
     def received(self) -> object:

@@ -77,12 +77,6 @@ def _check_place(option: str, path: Path, folder: bool) -> None:
         raise RequestError(option, str(path), f"a path in a folder with write permission: {place} has none")
 
 
-def check_json(options: argparse.Namespace) -> None:
-    """Raise RequestError unless the file of --json can be written and, without --force, does not exist."""
-    if options.json not in (None, "-"):
-        check_output("--json", Path(options.json), force=options.force)
-
-
 def check_data(paths: Sequence[Path]) -> None:
     """Raise RecordingError for a path that does not exist or is neither a recording nor a push table."""
     from push_predictor.recordings.table_file import ENDINGS, is_recording
@@ -93,9 +87,3 @@ def check_data(paths: Sequence[Path]) -> None:
         if not (is_recording(path) or path.name.endswith(ENDINGS)):
             accepted = "a recording (a folder, .mcap, .db3 or .bag) or a push table (.csv or .csv.gz)"
             raise RecordingError(f"{path}: give {accepted}")
-
-
-def check_seed(seed: int) -> None:
-    """Raise RequestError for a negative seed."""
-    if seed < 0:
-        raise RequestError("--seed", seed, "an integer of at least 0")

@@ -24,17 +24,16 @@ from msg_adapters.predictions import refuse
 from push_predictor.error_codes import ErrorCode
 from push_predictor.errors import BusyError, InactiveError, PushPredictorError, RecordingError, RequestError
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.store.model_file import save_model
 from push_predictor.nodes.runtime import refusal
-from push_predictor.online.child_process import Child
+from push_predictor.online.child_process import Child, Failure
 from push_predictor.online.trace_process import (
     EXTENDED,
     RESULTS,
-    Failed,
     Stage,
     Traced,
     TraceTask,
     evidence_in,
+    for_client,
     run_trace,
 )
 from push_predictor_interfaces.action import TraceResidual
@@ -163,13 +162,12 @@ class TraceAction(GuardedAction):
         output.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".trace-", dir=output, ignore_cleanup_errors=True) as work:
             folder = Path(work)
-            deployed = folder / "deployed.pushmodel"
-            save_model(model, deployed)  # the model in use; its original file may have changed since
             self._log.info(f"tracing {model.name} on {', '.join(map(str, evidence))}")
-            task = TraceTask(evidence, deployed, tuple(request.covariates), self._alpha(), folder)
+            task = TraceTask(evidence, model, tuple(request.covariates), self._alpha(), folder)
             ended = _watched(goal, check, task)
-            if isinstance(ended, Failed):
-                return TraceResidual.Result(success=False, message=ended.reason, error_code=int(ended.code))
+            if isinstance(ended, Failure):
+                reason = for_client(ended.reason, task)
+                return TraceResidual.Result(success=False, message=reason, error_code=int(ended.code))
             for name in RESULTS:
                 if (folder / name).exists():
                     (folder / name).replace(output / name)
@@ -187,17 +185,14 @@ def _evidence(field: str, given: str) -> tuple[Path, ...]:
     return found
 
 
-def _watched(goal: Any, check: Callable[[], None], task: TraceTask) -> Traced | Failed:
+def _watched(goal: Any, check: Callable[[], None], task: TraceTask) -> Traced | Failure:
     """The last message of the process; its stages become feedback. Raises what `check` raises, after its end."""
     child = Child("trace", run_trace)
     child.start(task)
     try:
         while True:
             check()
-            try:
-                received: Stage | Traced | Failed | None = child.received(POLL_PERIOD)
-            except (EOFError, OSError):
-                return Failed(_exit_reason(child.status(5.0)), ErrorCode.INTERNAL_ERROR)
+            received: Stage | Traced | Failure | None = child.received(POLL_PERIOD)
             if isinstance(received, Stage):
                 _publish(goal, received)
             elif received is not None:
@@ -217,9 +212,3 @@ def _result(traced: Traced, extended: Path) -> TraceResidual.Result:
         needs = ", ".join(traced.needs) or "no covariates"
         result.message += f" Load {result.extended_model} with load_model to use it; its requests need {needs}."
     return result
-
-
-def _exit_reason(status: int) -> str:
-    """In words, how a process ended that sent no result."""
-    how = f"signal {-status}" if status < 0 else f"status {status}"
-    return f"the process of the trace ended with {how} and no result, see the log of the node"

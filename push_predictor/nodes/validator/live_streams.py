@@ -14,12 +14,12 @@ from rclpy.qos import ReliabilityPolicy
 
 from push_predictor.errors import PushPredictorError, RecordingError
 from push_predictor.nodes.polling import FollowingSubscription, Taken
-from push_predictor.nodes.qos import DEEPEST, message_class
+from push_predictor.nodes.qos import message_class
 from push_predictor.online.stream_health import TopicReport, stamp_figures
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.messages import Messages
 from push_predictor.recordings.decoder.poses import PoseFrame
-from push_predictor.recordings.decoder.sources import STATIC
+from push_predictor.recordings.decoder.sources import STATIC, STREAMS
 from push_predictor.recordings.decoder.topic_input import RECENT, TopicInput
 from push_predictor.recordings.decoder.transform_buffer import TransformBuffer
 from push_predictor.recordings.fields.sources import TF_TYPES
@@ -32,18 +32,16 @@ NO_WRENCH = "No publisher: contact is found from geometry alone."
 
 
 class TopicStream:
-    """Moves the messages of a topic into an input of a decoder.
+    """Moves the messages of a topic into an input of a decoder: those of slider, pusher or wrench, or of a scalar.
 
-    earlier: also take what was sent before. Call `look` and `report` in the executor's thread; not at the same time as
-    `move`.
+    Of a scalar it also takes what was sent before. Call `look` and `report` in the executor's thread; not at the same
+    time as `move`. own: counts the samples.
     """
 
-    def __init__(self, node: Node, own: TopicInput, earlier: bool = False) -> None:
-        self.input = own
+    def __init__(self, node: Node, stream: str, own: TopicInput) -> None:
+        self.own, self._stream, self._is_sensor = own, stream, stream in STREAMS
         topic, first = own.source.topic, "" if own.source.field else own.target.type
-        self.subscription = FollowingSubscription(
-            node, topic, self._unfit, DEEPEST, first=first, earlier=earlier, overridable=not earlier
-        )
+        self.subscription = FollowingSubscription(node, topic, self._unfit, first=first, live=self._is_sensor)
         self.name = self.subscription.name + own.source.text[len(topic) :]  # after remapping, for people
         self._known: dict[str, str] = {}  # why a type does not fit, '' if it does
 
@@ -55,51 +53,51 @@ class TopicStream:
     def look(self) -> None:
         """Subscribe to the type that the publishers have, as they offer it."""
         self.subscription.look()
-        if (kind := self.subscription.kind) not in ("", self.input.kind):
-            self.input.declare(kind, {kind: definition_text(kind)})
+        if (kind := self.subscription.kind) not in ("", self.own.kind):
+            self.own.declare(kind, {kind: definition_text(kind)})
 
     def move(self) -> None:
         """Move arrived messages from the middleware into the input."""
         if taken := [*self.subscription.taken()]:
-            self.input.put(*as_messages(taken, self.input.source.topic, self.input.kind))
+            self.own.put(*as_messages(taken, self.own.source.topic, self.own.kind))
 
-    def report(self, stream: str) -> TopicReport:
+    def report(self) -> TopicReport:
         """What is known of the topic now."""
-        stamp, received, found = self.input.recent()
-        frames, own = tuple(sorted(found - {""})), self.subscription
+        stamp, received, found = self.own.recent()
+        frames, topic, kind = tuple(sorted(found - {""})), self.subscription, self.own.kind
         return TopicReport(
-            stream=stream,
+            stream=self._stream,
             topic=self.name,
-            kind=self.input.kind if self.input.kind in own.kinds or not own.kinds else " and ".join(own.kinds),
-            reliability=reliability_text(own.reliability),
+            kind=kind if kind in topic.kinds or not topic.kinds else " and ".join(topic.kinds),
+            reliability=reliability_text(topic.reliability),
             frames=frames,
             figures=stamp_figures(stamp, received),
-            problem=self._problem(stream, frames),
-            refused=bool(own.problem),
-            note=NO_WRENCH if stream == "wrench" and not own.offered else "",
+            problem=self._problem(frames),
+            refused=self._is_sensor and bool(topic.problem),
+            note=NO_WRENCH if self._stream == "wrench" and not topic.offered else "",
         )
 
-    def _problem(self, stream: str, frames: Sequence[str]) -> str:
+    def _problem(self, frames: Sequence[str]) -> str:
         own = self.subscription
         if not own.offered:
-            return "" if stream == "wrench" else "No publisher."
+            return "" if self._stream == "wrench" else "No publisher."
         if own.problem:
             return own.problem
         offered = [each.qos_profile.reliability for each in own.offered if each.topic_type == own.kind]
         if own.reliability == ReliabilityPolicy.RELIABLE and ReliabilityPolicy.BEST_EFFORT in offered:
             return "A publisher is best effort, but a QoS override demands reliable: none of its messages is received."
-        expected = self.input.expected
+        expected = self.own.expected
         if expected and (others := [frame for frame in frames if frame.strip("/") != expected]):
-            wrench = ", or wrench_frame to tip or a frame of tf" if stream == "wrench" else ""
+            wrench = ", or wrench_frame to tip or a frame of tf" if self._stream == "wrench" else ""
             names = " and ".join(map(repr, others))
             return f"frame_id {names} is not accepted, give {expected!r}, or set world_frame{wrench}."
-        return silence(own)
+        return silence(own) if self._is_sensor else ""
 
     def _unfit(self, kind: str) -> str:
         """Why messages of a type do not have what the stream needs, '' if they do."""
         if kind not in self._known:
             try:
-                self.input.check(kind, {kind: definition_text(kind)})
+                self.own.check(kind, {kind: definition_text(kind)})
                 self._known[kind] = ""
             except RecordingError as error:
                 self._known[kind] = str(error)
@@ -114,10 +112,8 @@ class TransformTopics:
 
     def __init__(self, node: Node, topic: str, buffer: TransformBuffer) -> None:
         self.buffer = buffer
-        self.moving = FollowingSubscription(
-            node, topic, _no_tf, DEEPEST, first=TF_TYPE, earlier=False, overridable=True
-        )
-        self._static = FollowingSubscription(node, topic + STATIC, _no_tf, DEEPEST, first=TF_TYPE)
+        self.moving = FollowingSubscription(node, topic, _no_tf, first=TF_TYPE, live=True)
+        self._static = FollowingSubscription(node, topic + STATIC, _no_tf, first=TF_TYPE)
 
     @property
     def lost(self) -> int:
@@ -159,27 +155,27 @@ def _no_tf(kind: str) -> str:
 
 
 class FrameStream:
-    """What is known of the poses of a frame. name: of the source, after remapping."""
+    """What is known of the poses of a frame. own: counts the samples."""
 
-    def __init__(self, node: Node, pose: PoseFrame, topics: TransformTopics) -> None:
-        topic = pose.source.topic
-        self.name = node.resolve_topic_name(topic) + pose.source.text[len(topic) :]
-        self._pose, self._topics = pose, topics
+    def __init__(self, node: Node, stream: str, own: PoseFrame, topics: TransformTopics) -> None:
+        self.own, self._stream, self._topics = own, stream, topics
+        topic = own.source.topic
+        self._name = node.resolve_topic_name(topic) + own.source.text[len(topic) :]  # after remapping
 
     @property
     def lost(self) -> int:
         """How many messages of tf were overwritten or missed."""
         return self._topics.lost
 
-    def report(self, stream: str) -> TopicReport:
+    def report(self) -> TopicReport:
         """What is known of the frame now."""
         return TopicReport(
-            stream=stream,
-            topic=self.name,
+            stream=self._stream,
+            topic=self._name,
             kind=TF_TYPE,
             reliability=reliability_text(self._topics.moving.reliability),
-            frames=tuple(self._pose.named),
-            figures=stamp_figures(self._pose.recent(RECENT), None),
+            frames=tuple(self.own.named),
+            figures=stamp_figures(self.own.recent(RECENT), None),
             problem=self._problem(),
             refused=bool(self._topics.refusal),
         )
@@ -187,8 +183,8 @@ class FrameStream:
     def _problem(self) -> str:
         if self._topics.problem:
             return self._topics.problem
-        if problem := self._pose.problem:
-            advice = "; set world_frame" if self._pose.lacks_world else ""
+        if problem := self.own.problem:
+            advice = "; set world_frame" if self.own.lacks_world else ""
             return f"{problem[0].upper()}{problem[1:]}{advice}."
         return silence(self._topics.moving)
 

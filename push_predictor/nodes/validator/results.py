@@ -87,9 +87,9 @@ class ResultWriter:
 
     def warn_of_interrupted(self, run: ValidationRun) -> None:
         """Log once where an earlier run was moved that had not come to its end."""
-        if run.table is None or (saved := run.table.cut_off) is None:
+        if run.files is None or (saved := run.files.cut_off) is None:
             return
-        run.table.cut_off = None
+        run.files.cut_off = None
         self._log.warning(
             f"An earlier validation was interrupted. Its windows and residuals are saved in {saved}. "
             "It has no validation.json, windows.json, bag of residuals or report."

@@ -8,14 +8,13 @@ from __future__ import annotations
 import struct
 import sys
 from bisect import bisect_right
-from collections.abc import Mapping
 from dataclasses import replace
 from time import time_ns
 
 import numpy as np
 from rclpy.node import Node
 
-from push_predictor.nodes.polling import ONE_TYPE, FollowingSubscription, Taken
+from push_predictor.nodes.polling import FollowingSubscription, Taken
 from push_predictor.nodes.validator.live_streams import TopicStream, as_messages
 from push_predictor.recordings.decoder.topic_input import LIMIT, TopicInput
 
@@ -58,83 +57,57 @@ class ClockHistory:
         return self._clock[place - 1] if place else None
 
 
-class ScalarTopics:
-    """Moves the messages of scalar topics into inputs, by name of the scalar.
+class ClockTopic:
+    """Moves the messages of /clock into a history. Call `look` in the executor's thread."""
 
-    Call `look` and `date` in the executor's thread, `move` in any, one at a time.
-    """
-
-    def __init__(self, node: Node, inputs: Mapping[str, TopicInput]) -> None:
-        self._streams = {name: TopicStream(node, own, earlier=True) for name, own in inputs.items()}
-        self._undated: dict[str, list[Taken]] = {name: [] for name in inputs}
-        self._ticks, self._clock = FollowingSubscription(node, CLOCK, _no_clock), ClockHistory()
+    def __init__(self, node: Node) -> None:
+        self._ticks, self.history = FollowingSubscription(node, CLOCK, _no_clock), ClockHistory()
 
     def look(self) -> None:
-        """Subscribe to topics that have appeared."""
-        for stream in self._streams.values():
-            stream.look()
-        if self._streams:
-            self._ticks.look()
-        self._clock.published = bool(self._ticks.offered)
+        """Subscribe as it is published."""
+        self._ticks.look()
+        self.history.published = bool(self._ticks.offered)
 
     def move(self) -> None:
         """Move arrived messages from the middleware."""
-        for name, stream in self._streams.items():
-            if stream.input.timed:
-                stream.move()
-            else:
-                self._undated[name] += stream.subscription.taken()
-                del self._undated[name][:-LIMIT]
         for tick in self._ticks.taken():
-            self._clock.put(tick.message, tick.sent)
+            self.history.put(tick.message, tick.sent)
+
+
+class ScalarTopic(TopicStream):
+    """A scalar's topic, whose messages may have no stamp: they wait until their time on /clock is known."""
+
+    def __init__(self, node: Node, name: str, own: TopicInput, clock: ClockHistory) -> None:
+        super().__init__(node, f"topic:{name}", own)
+        self._clock = clock
+        self._undated: list[Taken] = []
+
+    def __len__(self) -> int:
+        """How many messages wait."""
+        return len(self.own) + len(self._undated)
+
+    def move(self) -> None:
+        """Move arrived messages from the middleware."""
+        if self.own.timed:
+            super().move()
+        else:
+            self._undated += self.subscription.taken()
+            del self._undated[:-LIMIT]
 
     def date(self, last: bool = False) -> None:
-        """Date the messages whose time on /clock is known by now; last: all."""
+        """Date the messages whose time on /clock is known by now; last: all. Not at the same time as `move`."""
         until = sys.maxsize if last else self._clock.known_until(time_ns())
-        for name, waiting in self._undated.items():
-            due = [message for message in waiting if message.sent < until]
-            self._undated[name] = [message for message in waiting if message.sent >= until]
-            own, times = self._streams[name].input, [self._clock.at(message.sent) for message in due]
-            dated = [message for message, time in zip(due, times, strict=True) if time is not None]
-            if len(dated) < len(due):
-                own.received += len(due) - len(dated)
-                own.rejected["without time"] += len(due) - len(dated)
-            if dated:
-                messages, arrived = as_messages(dated, own.source.topic, own.kind)
-                known = np.array([time for time in times if time is not None], np.int64)
-                own.put(replace(messages, times=known), arrived)
-
-    def waiting(self) -> bool:
-        """Whether messages of every published topic wait."""
-        return all(
-            len(stream.input) or self._undated[name] for name, stream in self._streams.items() if stream.input.kind
-        )
-
-    def figures(self) -> dict[str, object]:
-        """Counts of messages by topic; rejected ones also by kind, for the kinds that occurred."""
-        found: dict[str, object] = {}
-        for name, stream in self._streams.items():
-            if stream.input.kind:
-                found[f"topic:{name} samples"] = stream.input.received + len(self._undated[name])
-                found |= {f"topic:{name} rejected {kind}": count for kind, count in stream.input.rejected.items()}
-        return found
-
-    def problems(self) -> list[str]:
-        """In words, which topics have no samples, and which samples of the others were rejected."""
-        found = []
-        for name, stream in self._streams.items():
-            topic, rejected = stream.subscription, stream.input.rejected
-            if topic.problem == ONE_TYPE:
-                types = ", ".join(topic.kinds)
-                found.append(f"Scalar topic {name} has publishers of the types {types}. One type is accepted.")
-            elif topic.problem:
-                found.append(f"{topic.problem.removesuffix('.')}.")
-            elif not stream.input.kind:
-                found.append(f"Scalar topic {name} has no publisher.")
-            elif rejected:
-                by_kind = ", ".join(f"{kind} {count}" for kind, count in rejected.items())
-                found.append(f"{name}: {rejected.total()} samples were rejected ({by_kind}).")
-        return found
+        due = [message for message in self._undated if message.sent < until]
+        self._undated = [message for message in self._undated if message.sent >= until]
+        times = [self._clock.at(message.sent) for message in due]
+        dated = [message for message, time in zip(due, times, strict=True) if time is not None]
+        if len(dated) < len(due):
+            self.own.received += len(due) - len(dated)
+            self.own.rejected["without time"] += len(due) - len(dated)
+        if dated:
+            messages, arrived = as_messages(dated, self.own.source.topic, self.own.kind)
+            known = np.array([time for time in times if time is not None], np.int64)
+            self.own.put(replace(messages, times=known), arrived)
 
 
 def _no_clock(kind: str) -> str:

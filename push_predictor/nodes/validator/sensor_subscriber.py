@@ -10,17 +10,15 @@ from dataclasses import replace
 from time import monotonic
 from typing import TypeAlias
 
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
-from rclpy.validate_topic_name import validate_topic_name
 
-from push_predictor.errors import RequestError
+from push_predictor.nodes.polling import check_sources
 from push_predictor.nodes.validator.live_streams import FrameStream, TopicStream, TransformTopics
-from push_predictor.nodes.validator.scalar_topics import ScalarTopics
-from push_predictor.online.stream_health import ReportLog, TopicReport
-from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of, name_of
-from push_predictor.recordings.decoder.poses import PoseFrame, PoseTopic
-from push_predictor.recordings.decoder.sources import COVARIATE, sources_of
+from push_predictor.nodes.validator.scalar_topics import ClockTopic, ScalarTopic
+from push_predictor.online.stream_health import TopicReport
+from push_predictor.recordings.decoder.decoder import Samples, StreamDecoder, key_of
+from push_predictor.recordings.decoder.poses import PoseFrame
+from push_predictor.recordings.decoder.sources import STREAMS
 from push_predictor.recordings.decoder.topic_input import TopicInput
 from push_predictor.recordings.decoder.wrench import UNKNOWN_BIAS
 from push_predictor.recordings.fields.transforms import WORLD
@@ -31,7 +29,7 @@ PERIOD = 0.01  # s between two looks into the middleware, which keeps the last m
 LOOK = 0.05  # s between two looks at the publishers
 PATIENCE = 1.0  # s that a run waits for the first message of every topic
 
-Stream: TypeAlias = TopicStream | FrameStream
+Stream: TypeAlias = FrameStream | TopicStream
 
 
 class SensorSubscriber:
@@ -46,22 +44,23 @@ class SensorSubscriber:
         self._error = node.get_logger().error
         self.decoder = decoder = StreamDecoder(topics, expected=WORLD)
         self._tf = {name: TransformTopics(node, f"/{name}", buffer) for name, buffer in decoder.tf.items()}
-        self._streams: dict[str, Stream] = {
-            name: FrameStream(node, pose, self._tf[key_of(pose.source.topic)])
+        sensors: list[Stream] = [
+            FrameStream(node, name, pose, self._tf[key_of(pose.source.topic)])
             if isinstance(pose, PoseFrame)
-            else TopicStream(node, pose.messages)
+            else TopicStream(node, name, pose.messages)
             for name, pose in decoder.poses.items()
-        }
-        self._streams["wrench"] = TopicStream(node, decoder.wrench.messages)
-        self._scalars = ScalarTopics(node, decoder.scalars)
-        sensors = [stream for stream in self._streams.values() if isinstance(stream, TopicStream)]
-        self._subscribed: tuple[ScalarTopics | TopicStream | TransformTopics, ...]
-        self._subscribed = (self._scalars, *sensors, *self._tf.values())
-        self._log = ReportLog()
-        self._reports: list[TopicReport] = []
+        ]
+        sensors.append(TopicStream(node, "wrench", decoder.wrench.messages))
+        clock = ClockTopic(node)
+        self._scalars = [ScalarTopic(node, name, own, clock.history) for name, own in decoder.scalars.items()]
+        self._streams = [*sensors, *self._scalars]
+        self._subscribed: list[TopicStream | TransformTopics | ClockTopic] = [*self._scalars]
+        self._subscribed += [stream for stream in sensors if isinstance(stream, TopicStream)]
+        self._subscribed += [*self._tf.values(), *([clock] if self._scalars else [])]
+        self._reports: dict[Stream, TopicReport] = {}
         self._empty = monotonic()  # when nothing waited last
-        of_topics = all(isinstance(pose, PoseTopic) for pose in decoder.poses.values())
-        self._settled = bool(topics.world) or of_topics  # whether the frame of poses is known from the first message
+        framed = any(isinstance(pose, PoseFrame) for pose in decoder.poses.values())
+        self._settled = bool(topics.world) or not framed  # whether the frame of poses is known from the first message
         self._looked = -LOOK
         self._draining, self._ending = threading.Lock(), threading.Event()
         self.look()
@@ -85,7 +84,8 @@ class SensorSubscriber:
         waiting = [len(each) > 0 for each in (*self.decoder.poses.values(), self.decoder.wrench.messages)]
         if not any(waiting):
             self._empty = monotonic()
-        early = all(waiting) and self._scalars.waiting() and self._settled
+        scalars = all(len(scalar) for scalar in self._scalars if scalar.own.kind)
+        early = all(waiting) and scalars and self._settled
         return early or monotonic() - self._empty > PATIENCE
 
     @property
@@ -125,26 +125,27 @@ class SensorSubscriber:
         """The usable samples since the last call."""
         self._empty = monotonic()
         with self._draining:
-            self._scalars.date()
+            for scalar in self._scalars:
+                scalar.date()
         return self.decoder.take()
 
     def last_scalars(self) -> dict[str, ScalarStream]:
         """The scalars since the last sample of a sensor."""
         with self._draining:
-            self._scalars.date(last=True)
+            for scalar in self._scalars:
+                scalar.date(last=True)
         return self.decoder.take_scalars(last=True)
 
     def inspect(self) -> list[TopicReport]:
-        """Make the reports about the topics anew, and return those to log."""
+        """Make the reports about the topics anew."""
         with self._draining:
-            reports = [stream.report(name) for name, stream in self._streams.items()]
-        self._reports = [self._amended(report) if report.stream == "wrench" else report for report in reports]
-        return self._log.news(self._reports)
+            self._reports = {stream: self._amended(stream.report()) for stream in self._streams}
+        return [*self._reports.values()]
 
     def _amended(self, report: TopicReport) -> TopicReport:
-        """The report about the wrench with what is wrong with its frame in tf; as it is without a publisher."""
+        """That about the wrench with what is wrong with its frame in tf; as it is without a publisher."""
         frame, problem = self.decoder.wrench.frame, self.decoder.wrench.problem
-        if not frame or report.problem or report.note:
+        if report.stream != "wrench" or not frame or report.problem or report.note:
             return report
         tf = next(iter(self._tf.values()))
         if tf.problem:
@@ -157,17 +158,18 @@ class SensorSubscriber:
     @property
     def refused(self) -> bool:
         """Whether a topic cannot be used as it is, by the last inspection."""
-        return any(report.refused for report in self._reports)
+        return any(report.refused for report in self._reports.values())
 
     def figures(self) -> dict[str, object]:
         """The report about each topic, counts of its messages, and of rejected ones by the kinds that occurred."""
-        found: dict[str, object] = {f"{report.stream} topic": report.line for report in self._reports}
-        for name, stream in self._streams.items():
-            own = self.decoder.of(name)
-            found |= {f"{name} samples": own.received, f"{name} rejected": own.rejected.total()}
+        found: dict[str, object] = {}
+        for stream, report in self._reports.items():
+            name, own = report.stream, stream.own
+            found |= {f"{name} topic": report.line, f"{name} samples": own.received}
+            found |= {f"{name} rejected": own.rejected.total()}
             found |= {f"{name} rejected {kind}": count for kind, count in own.rejected.items()}
             found |= {f"{name} {what}": n for what, n in (("dropped", own.dropped), ("lost", stream.lost)) if n}
-        return found | self._wrench_figures() | self._scalars.figures()
+        return found | self._wrench_figures()
 
     def _wrench_figures(self) -> dict[str, object]:
         wrench = self.decoder.wrench
@@ -180,40 +182,23 @@ class SensorSubscriber:
     def problems(self) -> list[str]:
         """What keeps pushes from being found, in words; about the topics by the last inspection."""
         found = []
-        for report in self._reports:
-            own, topic, lost = self.decoder.of(report.stream), report.topic, self._streams[report.stream].lost
+        for stream, report in self._reports.items():
+            name, own, topic = report.stream, stream.own, report.topic
             if report.problem:
                 found.append(f"{topic}: {report.problem}")
             if own.rejected:
                 kinds = ", ".join(f"{kind} {count}" for kind, count in own.rejected.items())
                 found.append(f"{topic}: {own.rejected.total()} of {own.received} samples were rejected ({kinds}).")
-            if isinstance(own, TopicInput) and (problem := self.decoder.problem(report.stream)):
+            if name in STREAMS and isinstance(own, TopicInput) and (problem := self.decoder.problem(name)):
                 found.append(f"{topic}: {problem}.")
-            if lost:
-                found.append(f"{topic}: {lost} samples were lost. Replay slower, or use a deeper queue (QoS).")
+            if stream.lost:
+                found.append(f"{topic}: {stream.lost} samples were lost. Replay slower, or use a deeper queue (QoS).")
             if own.dropped:
                 found.append(f"{topic}: {own.dropped} samples were dropped before they could be used.")
-        return found + self._wrench_problems() + self._scalars.problems()
+        return found + self._wrench_problems()
 
     def _wrench_problems(self) -> list[str]:
         wrench = self.decoder.wrench
         if wrench.bias is not None and wrench.estimate is not None and wrench.bias.problem:
             return [f"The bias of the wrench is kept as first estimated: {wrench.bias.problem}."]
         return [UNKNOWN_BIAS] if wrench.waits_for_bias else []
-
-
-def check_sources(topics: Topics) -> None:
-    """Raise RequestError that names the parameter, its value and what is accepted, for names that are not valid."""
-    scalars: set[str] = set()
-    for name, source in sources_of(topics):
-        frame = ", or a frame as in /tf:tool0" if name not in ("wrench", COVARIATE) else ""
-        accepted = f"a topic, or a topic and a field as in /odom.pose.pose{frame}"
-        try:
-            validate_topic_name(source.topic)
-        except InvalidTopicNameException as error:
-            raise RequestError(source.key, source.text, f"{accepted} ({' '.join(str(error).split())})") from None
-        if source.topic.startswith("~") or source.text.endswith(".") or not source.frame_fits(bool(frame)):
-            raise RequestError(source.key, source.text, accepted)
-        if name == COVARIATE and name_of(source) in scalars:
-            raise RequestError(source.key, source.text, "each topic or field once")
-        scalars |= {name_of(source)} if name == COVARIATE else set()

@@ -27,7 +27,6 @@ PATIENCE = 5.0  # s after which an unanswered request of list_models is sent aga
 IN_FLIGHT = 8  # a service queue of the default depth has ten places
 DEPTH = 1000  # a client receives the answers to all clients, which would crowd its own out of a short queue
 PAUSE = 1.0  # s after which a request is repeated that the server could not answer, or not for all models
-LOG_PERIOD = 10.0  # s between two log lines about a server that does not answer in time
 NOT_NOW = (ErrorCode.NOT_ACTIVE, ErrorCode.UNKNOWN_MODEL)  # refusals because of the server's state, not of the push
 Answer: TypeAlias = Callable[[PredictPush.Response], None]
 
@@ -121,18 +120,16 @@ class PredictionClient:
     """Queues of requests to predict_push, one for each model.
 
     A request without an answer at its deadline is sent again; the first answer counts. One that is refused because of
-    the server's state (a model not loaded yet, a node not active) waits and is sent again. The log reports when the
-    server stops answering, and when it answers again.
+    the server's state (a model not loaded yet, a node not active) waits and is sent again.
     """
 
     def __init__(self, node: Node, timeout: float) -> None:
         self._client = node.create_client(PredictPush, "predict_push", qos_profile=QoSProfile(depth=DEPTH))
-        self._timeout, self._log = timeout, node.get_logger()
+        self._timeout = timeout
         self._waiting: dict[str, deque[_Pending]] = {}
         self._blocked: dict[str, tuple[float, str]] = {}  # by model: until when, and why
         self._sent: list[_Pending] = []
-        self._silent_since: float | None = None
-        self._sent_again = 0  # since then
+        self._silent = False  # whether a request became overdue since the last answer
         self.timeouts = 0
 
     @property
@@ -148,7 +145,7 @@ class PredictionClient:
     @property
     def problems(self) -> list[str]:
         """In words, that the server does not answer, and why it refuses some models."""
-        silent = [f"no answer within {self._timeout:g} s, requests are sent again"] if self._silent_since else []
+        silent = [f"no answer within {self._timeout:g} s, requests are sent again"] if self._silent else []
         return [f"predict_push: {reason}" for reason in [*silent, *(reason for _, reason in self._blocked.values())]]
 
     def ask(self, request: PredictPush.Request, on_answer: Answer) -> None:
@@ -162,7 +159,8 @@ class PredictionClient:
         now = monotonic()
         for pending in self._sent:
             if pending.deadline < now:
-                self._note_silence(now)
+                self._silent = True
+                self.timeouts += 1
                 self._send(pending, now)
         while len(self._sent) < IN_FLIGHT and (queue := self._next_queue(now)) is not None:
             self._sent.append(pending := queue.popleft())
@@ -175,24 +173,7 @@ class PredictionClient:
         self._sent.clear()
         self._waiting.clear()
         self._blocked.clear()
-        self._silent_since = None
-
-    def _note_silence(self, now: float) -> None:
-        self.timeouts += 1
-        if self._silent_since is None:
-            self._silent_since, self._sent_again = now - self._timeout, 0
-            text = f"predict_push: no answer within {self._timeout:g} s, requests are sent again"
-            self._log.warning(text, throttle_duration_sec=LOG_PERIOD)
-        self._sent_again += 1
-
-    def _note_answer(self) -> None:
-        if (since := self._silent_since) is not None:
-            self._silent_since = None
-            self._log.warning(
-                f"predict_push answers again after {monotonic() - since:.1f} s. Requests sent again: "
-                f"{self._sent_again}; waiting: {self.open}; given up: 0.",
-                throttle_duration_sec=LOG_PERIOD,
-            )
+        self._silent = False
 
     def _next_queue(self, now: float) -> deque[_Pending] | None:
         """The longest queue of the models whose requests may be sent now."""
@@ -210,7 +191,7 @@ class PredictionClient:
             return
         self._sent.remove(pending)
         self._abandon(pending)
-        self._note_answer()
+        self._silent = False
         response, model = future.result(), pending.request.model
         if not response.success and response.error_code in NOT_NOW:
             self._blocked[model] = (monotonic() + PAUSE, response.message)

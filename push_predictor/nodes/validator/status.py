@@ -20,6 +20,7 @@ from push_predictor.nodes.validator.sensor_subscriber import SensorSubscriber
 from push_predictor.nodes.validator.server_client import ModelSource, PredictionClient
 from push_predictor.nodes.validator.validation_run import ValidationRun
 from push_predictor.online.alarm_process import AlarmProcess
+from push_predictor.online.news import News
 from push_predictor.online.session import SILENCE, Session, State
 from push_predictor.recordings.windows.stream_faults import describe_faults
 
@@ -43,16 +44,14 @@ class StatusPublisher:
         self._node, self._session, self._writer = node, session, writer
         self._models, self._rigs, self._sensors, self._client = models, rigs, sensors, client
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._logged: list[str] = []
+        self._news, self._topic_news = News(at_once=True), News()
 
     def publish(self, run: ValidationRun | None) -> None:
         """Publish the status of this moment. run: the present one or the last."""
         self._log_topics()
         problems = self._problems(run)
-        if problems != self._logged:
-            self._logged = problems
-            for problem in problems:
-                self._node.get_logger().warning(problem)
+        for problem in self._news.of(dict.fromkeys(problems, "")):
+            self._node.get_logger().warning(problem)
         status = self._status(run, problems)
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
@@ -61,9 +60,11 @@ class StatusPublisher:
         return _paragraph(["Nothing was validated", *self._problems(None), *self._sensors.problems()])
 
     def _log_topics(self) -> None:
-        """Log a line for each sensor topic of which something has changed."""
+        """Log a line for each topic of which something has changed."""
         log = self._node.get_logger()
-        for report in self._sensors.inspect():
+        reports = {report.stream: report for report in self._sensors.inspect()}
+        for stream in self._topic_news.of({stream: report.key for stream, report in reports.items()}):
+            report = reports[stream]
             if report.refused:  # one line each: rclpy binds the severity to the place of the call
                 log.error(report.line)
             elif report.problem:
@@ -72,16 +73,17 @@ class StatusPublisher:
                 log.info(report.line)
 
     def _problems(self, run: ValidationRun | None) -> list[str]:
-        unsaved = run.journal.failure if run and run.journal else ""
+        unsaved = run.files.failure if run and run.files else ""
         silent = SILENT if self._session.silent(monotonic()) else ""
         found = [*(self._models.problems or [self._models.missing]), self._rigs.problem, unsaved, silent]
+        found += self._client.problems
         found += [*run.checks.check.problems, *(finding.text for finding in run.coverage or [])] if run else []
         return [*filter(None, dict.fromkeys(found))]
 
     def _status(self, run: ValidationRun | None, problems: Sequence[str]) -> DiagnosticStatus:
         """ERROR for a failure, a refused topic or refused samples, WARN for a problem."""
         sensors, client, rig, failure = self._sensors, self._client, self._rigs.rig, self._session.failure
-        warnings = [*problems, *sensors.problems(), *client.problems, *(_run_problems(run) if run else [])]
+        warnings = [*problems, *sensors.problems(), *(_run_problems(run) if run else [])]
         if not client.server_available:
             warnings.append(NO_SERVER)
         wrong = failure or sensors.refused or (run is not None and run.checks.check.failed)
@@ -91,7 +93,7 @@ class StatusPublisher:
         values |= {"timeouts": client.timeouts, "refused": run.refused if run else 0}
         if run is not None:
             values |= _stream_figures(run, sensors) | _scores(run) | _checks(run)
-            values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.table.path)} if run.table else {})
+            values |= _alarm_figures(run.alarm) | ({"kept windows": str(run.files.path)} if run.files else {})
         message, name = _paragraph([failure, *warnings]) or state, self._node.get_fully_qualified_name()
         return diagnostic_status(name, "validation", level, message, values, rig.shape if rig else "")
 
@@ -125,8 +127,6 @@ def _run_problems(run: ValidationRun) -> list[str]:
     found += [*run.sync.problems(), *describe_faults(run.finder.counts)]
     if run.refused:
         found.append(f"predict_push refused {run.refused} requests. The last, of model {run.last_refusal}")
-    if run.table is not None and run.table.failure:
-        found.append(run.table.failure)
     if run.alarm is not None:
         found += _alarm_problems(run.alarm)
     return found

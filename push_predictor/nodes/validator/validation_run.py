@@ -22,11 +22,11 @@ from push_predictor.evaluation.offline import window_options
 from push_predictor.models.prediction import Prediction
 from push_predictor.models.push_model import PushModel
 from push_predictor.nodes.validator.server_client import PredictionClient
-from push_predictor.online.alarm_process import AlarmProcess, CompletedPushes
+from push_predictor.online.alarm_process import AlarmProcess
 from push_predictor.online.check_process import SampleCheck
 from push_predictor.online.live_validation import MAIN_RESULT, LiveValidation
+from push_predictor.online.run_files import JOURNAL, RunFiles
 from push_predictor.online.stream_health import StreamSync
-from push_predictor.online.window_table import JOURNAL, ResidualJournal, WindowTable
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.bag.message_types import definition_text
 from push_predictor.recordings.bag.writer import BagWriter
@@ -67,15 +67,13 @@ class ValidationRun:
     ) -> None:
         self.rig = rig
         self.alarm = alarm
-        self.table = WindowTable(output, rig) if output else None
-        self.journal = ResidualJournal(output) if output else None
+        self.files = RunFiles(output, rig) if output else None
         self.validation = LiveValidation(models)
         self.sync = StreamSync(scalars)  # how far each stream has come
         self.checks = SampleCheck(rig, strict)
         self.coverage: list[Finding] | None = None  # what the windows leave out of the domain, known at the end
         self.refused = 0
         self.last_refusal = ""
-        self._pushes = CompletedPushes()
         self.finder = WindowFinder(rig, window_options(self.validation.models[0]))
         self._client = client
         self._publish, self._world = publish, world
@@ -111,7 +109,7 @@ class ValidationRun:
 
     def pass_to_alarm(self, last: bool = False) -> None:
         """Hand the complete pushes to the alarm; last: also those with windows that will not be answered."""
-        for push in self._pushes.take(last):
+        for push in self.validation.completed(last):
             if self.alarm is not None:
                 self.alarm.add(push)
 
@@ -122,11 +120,10 @@ class ValidationRun:
                 self._first.setdefault(f"topic:{name}", float(stream.value[0]))
 
     def _request(self, windows: Sequence[PushWindow]) -> None:
-        if self.table is not None:
-            self.table.add(windows, self.validation.windows, self._first)
+        if self.files is not None:
+            self.files.add(windows, self.validation.windows, self._first)
         for window in windows:
             number = self.validation.add(window)
-            self._pushes.found(number, window)
             push = np.array([window.velocity, window.contact, window.angle])
             for model, name in enumerate(self.validation.names):
                 request = query_to_request(name, push, window.duration, self._known(model, window))
@@ -147,18 +144,12 @@ class ValidationRun:
             self.refused += 1
             self.last_refusal = f"{name}: {error}"
             self.validation.refuse(model, number, str(error))
-            self._settle(model, number, window, None)
-            return
-        self.validation.record(model, number, prediction)
-        self._settle(model, number, window, prediction)
-        if self.journal is not None:
-            self.journal.add(name, window, mean, covariance)
-        self._publish(self.rig, model, window, prediction, residual)
-
-    def _settle(self, model: int, number: int, window: PushWindow, prediction: Prediction | None) -> None:
-        if model == 0:
-            self._pushes.answered(number, window, prediction)
-            self.pass_to_alarm()
+        else:
+            self.validation.record(model, number, prediction)
+            if self.files is not None:
+                self.files.add_residual(name, window, mean, covariance)
+            self._publish(self.rig, model, window, prediction, residual)
+        self.pass_to_alarm()
 
 
 def write_residuals(validation: LiveValidation, folder: Path, frame_id: str) -> Path:

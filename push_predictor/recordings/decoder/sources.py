@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from push_predictor.errors import RequestError
 from push_predictor.recordings.fields.sources import POSE_TARGET, WRENCH_TARGET, Source
 from push_predictor.recordings.topics import DEFAULT_TOPICS, Topics
 
@@ -67,15 +66,9 @@ def scalar_source(text: str) -> Source:
 
 
 def resolved(given: Topics, resolve: Callable[[str], str]) -> Topics:
-    """The topics of all streams with their full names, by a function from a topic's name to its full name.
-
-    Raises RequestError for a text that is not TOPIC, TOPIC.FIELD or, for a pose, /tf:FRAME.
-    """
+    """The topics of all streams with their full names, by a function from a topic's name to its full name."""
     names: dict[str, list[str]] = {}
     for name, source in sources_of(given):
-        text, has_frames = source.text, name in POSES
-        if not source.topic.strip("/ ") or not source.frame_fits(has_frames):
-            raise RequestError(source.key, text, "TOPIC, TOPIC.FIELD" + (" or /tf:FRAME" if has_frames else ""))
-        names.setdefault(name, []).append(resolve(source.topic) + text[len(source.topic) :])
+        names.setdefault(name, []).append(resolve(source.topic) + source.text[len(source.topic) :])
     streams = {name: names[name][0] for name in STREAMS}
     return replace(given, **streams, covariates=tuple(names.get(COVARIATE, ())))

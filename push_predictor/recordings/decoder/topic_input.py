@@ -98,7 +98,7 @@ class TopicInput:
 
     def take(self) -> Columns:
         """The columns of the messages since the last call."""
-        parts = [columns for columns, _ in self._decoded(last=True)]
+        parts = [columns for columns, _ in self._decoded()]
         return joined(parts or [Columns.unread(np.empty(0, np.int64), self.target.count)])
 
     def usable(self, rules: Rules) -> Columns:
@@ -111,9 +111,10 @@ class TopicInput:
 
     def recent(self) -> tuple[IntArray, IntArray, frozenset[str]]:
         """Stamps (n,) and times of receipt (n,) in ns of the last readable messages, and the frames that they name."""
-        decoded = self._decoded(last=False)
-        with self._lock:
+        decoded = self._decoded()
+        with self._lock:  # messages that came meanwhile are newer
             self._waiting[:0] = decoded
+            self._count += sum(len(columns) for columns, _ in decoded)
             self._drop_oldest()
         stamp, arrived = (
             np.concatenate([np.empty(0, np.int64), *of]) for of in ([r[k] for r in self._recent] for k in (0, 1))
@@ -126,11 +127,11 @@ class TopicInput:
             old = len(self._waiting.pop(0)[0])
             self.dropped, self._count = self.dropped + old, self._count - old
 
-    def _decoded(self, last: bool) -> list[tuple[Columns, IntArray | None]]:
-        """What waited, as columns; last: it waits no longer."""
+    def _decoded(self) -> list[tuple[Columns, IntArray | None]]:
+        """What waited, as columns; it waits no longer."""
         with self._lock:
-            waiting, reader, self._waiting = self._waiting, self._reader, []
-            self._count = 0 if last else self._count
+            waiting, reader = self._waiting, self._reader
+            self._waiting, self._count = [], 0
         found: list[tuple[Columns, IntArray | None]] = []
         for part, arrived in waiting:
             if isinstance(part, Messages):

@@ -13,7 +13,7 @@ import pytest
 from made_up_windows import made_up_windows
 from synthetic import square_rig
 
-from push_predictor.online.window_table import WindowTable
+from push_predictor.online.run_files import RunFiles
 from push_predictor.recordings.table_file import read_table, rig_of_table
 from push_predictor.recordings.windows.push_window import windows_to_table
 
@@ -24,7 +24,7 @@ def test_windows_before_a_scalar_get_its_first_value_or_none(
 ) -> None:
     early = made_up_windows(5, seed=1)
     late = [replace(w, covariates={**w.covariates, "topic:/warmth": 2.5}) for w in made_up_windows(3, seed=2)]
-    table = WindowTable(tmp_path, square_rig())
+    table = RunFiles(tmp_path, square_rig())
     table.add(early[:2], [])
     table.add(early[2:], early[:2])
     table.add(late, early, first)
@@ -37,11 +37,11 @@ def test_windows_before_a_scalar_get_its_first_value_or_none(
 
 
 def test_a_table_that_cannot_be_written_is_a_problem_and_no_error(tmp_path: Path) -> None:
-    table = WindowTable(tmp_path / "gone", square_rig())
+    table = RunFiles(tmp_path / "gone", square_rig())
     (tmp_path / "gone").write_text("a file")
     windows = made_up_windows(2, seed=1)
     table.add(windows, [])
-    assert table.failure.startswith("Windows are no longer saved: ") and str(tmp_path) in table.failure
+    assert table.failure.startswith("Windows and residuals are no longer saved: ") and str(tmp_path) in table.failure
     (tmp_path / "gone").unlink()
     table.add(windows, [])
     assert not (tmp_path / "gone").exists(), "a table with a gap would be no table of the run"

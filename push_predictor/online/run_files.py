@@ -10,6 +10,7 @@ every prediction to the journal of the residuals.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
 from types import MappingProxyType
@@ -31,14 +32,19 @@ HEADER = (*COLUMNS, "model", "window", "end", *_PREDICTED, *_COVARIANCE)
 NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
-class WindowTable:
-    """FOLDER/pushes.csv and its rig file, started again with the first window that is added."""
+class RunFiles:
+    """FOLDER/pushes.csv and its rig file, and the journal FOLDER/residuals.csv, begun with the first window.
+
+    The journal is a push table of the predicted windows, with the model and its prediction. Lines are appended as a
+    whole. path: of the push table. failure: why nothing more is saved, in words; a full disk does not end the
+    measurement. cut_off: folder that an earlier, interrupted validation was moved to.
+    """
 
     def __init__(self, folder: Path, rig: Rig) -> None:
-        self.path, self._rig = folder / TABLE, rig
+        self.path, self._journal, self._rig = folder / TABLE, folder / JOURNAL, rig
         self._names: tuple[str, ...] | None = None
-        self.failure = ""  # why no more windows are saved, in words
-        self.cut_off: Path | None = None  # folder that an earlier, interrupted validation was moved to
+        self.failure = ""
+        self.cut_off: Path | None = None
 
     def add(
         self, windows: Sequence[PushWindow], before: Sequence[PushWindow], first: Mapping[str, float] = NOTHING
@@ -46,22 +52,38 @@ class WindowTable:
         """Append windows; `before` are all those that are in the file.
 
         first: first value of each scalar topic, which windows before it get, as when a recording is read; without one
-        NaN. A full disk does not end the measurement: see `failure`.
+        NaN.
         """
         if not windows or self.failure:
             return
         names = tuple(dict.fromkeys(name for window in windows for name in window.covariates))
-        try:
+        with self._saving():
             if self._names is None or not set(names) <= set(self._names):
                 self._begin(tuple(dict.fromkeys([*(self._names or ()), *names])), before, first)
             append_lines(self.path, self._rows(windows, first))
+
+    def add_residual(self, model: str, window: PushWindow, mean: Array, covariance: Array) -> None:
+        """Append a prediction (3,), (3, 3)."""
+        if self.failure:
+            return
+        numbers = map(repr, (*mean.tolist(), *covariance.ravel().tolist()))
+        cells = [*_cells(window), _quoted(model), str(window.index), str(window.end), *numbers]
+        with self._saving():
+            append_lines(self._journal, [",".join(cells)])
+
+    @contextmanager
+    def _saving(self) -> Iterator[None]:
+        """Keep a failure, after which nothing is written: a table with a gap would be no table of the run."""
+        try:
+            yield
         except OSError as error:
-            self.failure = f"Windows are no longer saved: {error}"
+            self.failure = f"Windows and residuals are no longer saved: {error}"
 
     def _begin(self, names: tuple[str, ...], before: Sequence[PushWindow], first: Mapping[str, float]) -> None:
         if self._names is None:
             self.cut_off = put_aside(self.path.parent)
-            ResidualJournal(self.path.parent).begin()
+            self._journal.unlink(missing_ok=True)
+            append_lines(self._journal, [",".join(HEADER)])
         self._names = names
         lines = [",".join([*COLUMNS, *names]), *self._rows(before, first)]
         write_whole(self.path, (f"{line}\n".encode() for line in lines))
@@ -71,36 +93,6 @@ class WindowTable:
         for window in windows:
             covariates = (window.covariates.get(name, first.get(name, np.nan)) for name in self._names or ())
             yield ",".join([*_cells(window), *map(repr, map(float, covariates))])
-
-
-class ResidualJournal:
-    """FOLDER/residuals.csv: a push table of the predicted windows, with the model and its prediction.
-
-    Every prediction is appended as soon as it arrives, as a whole line.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.path = folder / JOURNAL
-        self.failure = ""  # why no more residuals are saved, in words
-
-    def begin(self) -> None:
-        """Write the empty table, which marks an open validation. Raises OSError that names the path."""
-        self.path.unlink(missing_ok=True)
-        append_lines(self.path, [",".join(HEADER)])
-
-    def add(self, model: str, window: PushWindow, mean: Array, covariance: Array) -> None:
-        """Append a prediction (3,), (3, 3). A full disk does not end the measurement: see `failure`."""
-        if self.failure:
-            return
-        cells = [
-            *_cells(window),
-            *(_quoted(model), str(window.index), str(window.end)),
-            *map(repr, (*mean.tolist(), *covariance.ravel().tolist())),
-        ]
-        try:
-            append_lines(self.path, [",".join(cells)])
-        except OSError as error:
-            self.failure = f"Residuals are no longer saved: {error}"
 
 
 def put_aside(folder: Path) -> Path | None:
