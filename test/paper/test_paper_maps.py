@@ -14,7 +14,7 @@ import pytest
 from paper_studies import PLAN, made_up_study, rig_of, verdict_on
 from push_predictor_paper.data.repetitions import PATH_POINTS, RepeatedGrid, Repetitions, contact_on_first_side
 from push_predictor_paper.fits.fit import Answer
-from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, square_maps
+from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, reference_maps
 from push_predictor_paper.plan import GRID_SPEED
 from push_predictor_paper.sections.maps import (
     MIRRORED,
@@ -220,7 +220,7 @@ def test_a_model_that_is_the_truth_agrees_and_one_without_shape_does_not() -> No
 
 def test_maps_are_nan_outside_the_training_data(tmp_path: Path) -> None:
     study = made_up_study(tmp_path)
-    model = square_maps(study, study.simulated)[0]
+    model = reference_maps(study, "vhgp")[0]
     assert np.isnan(model.mean[0, 0]).all()  # no made-up push is at 1.5 rad
     assert np.isfinite(model.mean[30, 20]).all()
     assert model.at_pushes is not None and len(model.at_pushes.mean) == len(study.reference_grid.seen)
