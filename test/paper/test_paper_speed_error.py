@@ -26,6 +26,8 @@ from push_predictor_paper.sections.speed_error import (
 )
 from scipy.stats import spearmanr
 
+from push_predictor.evaluation.splits import push_bootstrap
+
 SPEEDS = np.array([0.02, 0.1, 0.2, 0.4])
 PUSHES = 60  # at each speed
 
@@ -102,6 +104,17 @@ def test_the_nmse_within_a_speed_is_measured_by_the_spread_at_that_speed():
     observed = held.observed
     wrong = replace(held, predicted={**held.predicted, "gp": np.zeros_like(observed) + observed[:PUSHES].mean(axis=0)})
     assert within_nmse(wrong.at(0), ("gp",)).value == pytest.approx(3.0)
+
+
+def test_resampled_pushes_are_measured_by_their_own_spread():
+    at = windows().at(0)
+    error, observed = at.error("gp"), at.observed
+    drawn = []
+    for weight in push_bootstrap(at.push_id):  # a window each
+        rows = np.repeat(np.arange(len(observed)), weight.astype(int))
+        drawn.append((error[rows].mean(axis=0) / observed[rows].var(axis=0)).sum())
+    found = within_nmse(at, ("gp",))
+    np.testing.assert_allclose([found.low, found.high], np.quantile(drawn, [0.025, 0.975]))
 
 
 def test_the_difference_of_two_kinds_is_that_of_their_figures():

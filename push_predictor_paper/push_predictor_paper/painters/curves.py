@@ -58,8 +58,8 @@ class Line:
 class Panel:
     """One pair of axes, the horizontal one logarithmic.
 
-    ratio: a logarithmic vertical axis; shaded: a range of x; levels, places: horizontal and vertical
-    lines by name; crossings: colour and place, marked at the foot; limits: of the vertical axis.
+    ratio: a logarithmic vertical axis; shaded: a range of x; levels: horizontal lines by
+    name; crossings: colour and place, marked at the foot; limits: of the vertical axis.
     """
 
     title: str
@@ -70,7 +70,6 @@ class Panel:
     ratio: bool = False
     shaded: tuple[float, float] | None = None
     levels: Mapping[str, float] = field(default_factory=dict)
-    places: Mapping[str, float] = field(default_factory=dict)
     crossings: Sequence[tuple[str, Crossing]] = ()
     limits: tuple[float, float] | None = None
 
@@ -113,8 +112,6 @@ def _paint(ax: Axes, panel: Panel) -> None:
         ax.axvspan(*panel.shaded, color="0.88", linewidth=0.0, zorder=0)
     for (name, level), dashes in zip(panel.levels.items(), ("--", ":"), strict=False):
         ax.axhline(level, color="0.2", linewidth=0.9, linestyle=dashes, label=name)
-    for name, place in panel.places.items():
-        ax.axvline(place, color="black", linewidth=1.0, linestyle=":", label=name)
     for line in panel.lines:
         _paint_line(ax, line)
     for k, (colour, where) in enumerate(panel.crossings):

@@ -19,7 +19,6 @@ from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, Answer
 from push_predictor_paper.fits.map_models import reference_maps
-from push_predictor_paper.painters.curves import KIND_LOOKS, Panel, cumulative, paint_curves
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, Statistic, block_weights, by_blocks, mean_of, median_of
@@ -54,7 +53,7 @@ class Divergences:
 
 
 def section(study: Study) -> Section:
-    """The paper's table, and maps and distribution of the divergence."""
+    """The paper's table, and maps of the divergence."""
     grid = study.reference_grid
     if not grid.seen:
         raise TooFewError("No push of the grid has enough repetitions for a mean and a standard deviation.")
@@ -66,7 +65,7 @@ def section(study: Study) -> Section:
     return Section(
         {**{name: nearer(name, found) for name in STATISTICS}, "good": good},
         (_table(study, found, floor),),
-        (_maps(study, grid, found), _curves(study, grid, found, floor)),
+        (_maps(study, grid, found),),
         NOTES,
     )
 
@@ -161,25 +160,4 @@ def _maps(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences]) -> Pi
         partial(paint_maps, rows=[("", maps)]),
         f"Maps of the KL divergence over contact and angle for GP and VHGP. {len(grid.seen)} simulated pushes on "
         f"{grid.surface}, three outputs, mean of {study.plan.seeds} seeds, one log scale; grey: too few repetitions.",
-    )
-
-
-def _curves(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences], floor: float) -> Picture:
-    lines = [cumulative(KIND_NAMES[kind], KIND_LOOKS[kind], of[kind].correct.mean(axis=0)) for kind in KINDS]
-    ticks = [t for t in (0.03, 0.1, 0.3, 1, 3, 10, 30, 100, 300) if t <= max(max(line.x) for line in lines)]
-    panel = Panel(
-        "",
-        "KL (nats, three outputs)",
-        "cumulative share of pushes (%)",
-        lines,
-        ticks,
-        places={f"perfect model: {floor:.3f}": floor},
-        limits=(0.0, 100.0),
-    )
-    return picture(
-        study.out / "divergence.png",
-        (6.4, 3.4),
-        partial(paint_curves, rows=[[panel]]),
-        f"Distribution of the KL divergence over pushes, for each model. {len(grid.seen)} simulated pushes on "
-        f"{grid.surface}, mean of {study.plan.seeds} seeds. Dotted: expected value of a perfect model.",
     )
