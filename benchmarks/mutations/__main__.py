@@ -17,6 +17,7 @@ import sys
 import threading
 import time
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -84,18 +85,20 @@ def main() -> int:
     if not options.calls.is_dir():
         make_map(options.calls.resolve(), options.cores)
     tests = Map(options.calls)
-    mutants = (
-        read(options.again, options.survivors) if options.again else drawn(options.count, options.seed, options.within)
-    )
-    judged = judge(mutants, tests, options.cores, options.out)
+    killers: dict[Mutant, str] = {}
+    if options.again:
+        killers = read(options.again, options.survivors)
+    mutants = list(killers) or drawn(options.count, options.seed, options.within)
+    judged = judge(mutants, killers, tests, options.cores, options.out)
     print(table(judged))
     return 0
 
 
-def read(file: Path, survivors: bool) -> list[Mutant]:
-    """The mutants in a file of results."""
+def read(file: Path, survivors: bool) -> dict[Mutant, str]:
+    """The mutants in a file of results, each with the test file that noticed it: it is run first."""
     entries = [json.loads(line) for line in file.read_text().splitlines()]
-    return [Mutant(**entry["mutant"]) for entry in entries if not survivors or entry["result"] == "survived"]
+    chosen = [entry for entry in entries if not survivors or entry["result"] == "survived"]
+    return {Mutant(**entry["mutant"]): entry["by"].partition("::")[0] for entry in chosen}
 
 
 def make_map(folder: Path, cores: int) -> None:
@@ -107,7 +110,7 @@ def make_map(folder: Path, cores: int) -> None:
     shutil.rmtree(tree)
 
 
-def judge(mutants: list[Mutant], tests: Map, cores: int, out: Path) -> list[Judged]:
+def judge(mutants: list[Mutant], killers: Mapping[Mutant, str], tests: Map, cores: int, out: Path) -> list[Judged]:
     """Judge all mutants on `cores` copies of the tree; each result is appended to the file at once."""
     waiting: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
     for mutant in mutants:
@@ -119,7 +122,9 @@ def judge(mutants: list[Mutant], tests: Map, cores: int, out: Path) -> list[Judg
     def work(number: int) -> None:
         tree = copied_tree(out.parent / f"mutations_tree_{number}")
         while not waiting.empty():
-            result = judge_one(waiting.get(), tests, tree, 150 + number)
+            mutant = waiting.get()
+            files = tests.of(mutant)
+            result = judge_one(mutant, [[killers.get(mutant, "")], files], tree, 150 + number)
             judged.append(result)
             with out.open("a") as file:
                 file.write(json.dumps(asdict(result)) + "\n")
@@ -149,8 +154,8 @@ def copied_tree(tree: Path) -> Path:
     return tree
 
 
-def judge_one(mutant: Mutant, tests: Map, tree: Path, domain: int) -> Judged:
-    """Put one mutant into the copy, run its tests until one fails, and take it out again."""
+def judge_one(mutant: Mutant, tests: Sequence[Sequence[str]], tree: Path, domain: int) -> Judged:
+    """Put one mutant into the copy, run groups of test files until a test fails, and take it out again."""
     path = tree / mutant.file
     sound = path.read_text() if path.is_file() else ""
     changed = mutant.applied(sound)
@@ -159,17 +164,17 @@ def judge_one(mutant: Mutant, tests: Map, tree: Path, domain: int) -> Judged:
     begin = time.monotonic()
     path.write_text(changed)
     try:
-        result, by = failed_test(tests.of(mutant), tree, domain)
+        by = next((by for files in tests if (by := failed_test(files, tree, domain))), "")
     finally:
         path.write_text(sound)
-    return Judged(mutant, result, by, time.monotonic() - begin)
+    return Judged(mutant, "killed" if by else "survived", by, time.monotonic() - begin)
 
 
-def failed_test(files: list[str], tree: Path, domain: int) -> tuple[str, str]:
-    """Whether a test fails, and the first that does."""
+def failed_test(files: Sequence[str], tree: Path, domain: int) -> str:
+    """The first test that fails, empty if none does."""
     present = [file for file in files if (tree / file).is_file()]
     if not present:
-        return "survived", "no test"
+        return ""
     call = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "not long", "--tb=no", *present]
     with subprocess.Popen(
         call,
@@ -184,11 +189,11 @@ def failed_test(files: list[str], tree: Path, domain: int) -> tuple[str, str]:
             text, _ = run.communicate(timeout=MOST_SECONDS)
         except subprocess.TimeoutExpired:
             os.killpg(run.pid, signal.SIGKILL)
-            return "killed", "did not end"
+            return "did not end"
     if run.returncode in (0, 5):
-        return "survived", ""
+        return ""
     found = re.search(r"^(?:FAILED|ERROR) (\S+)", text, re.MULTILINE)
-    return "killed", found[1] if found else text.strip()[-200:]
+    return found[1] if found else text.strip()[-200:]
 
 
 def environment(tree: Path, domain: int) -> dict[str, str]:

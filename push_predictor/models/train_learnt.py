@@ -186,7 +186,8 @@ def _trained(
         if kind == "gp":
             fitted.append(fit_gp(features, columns[k], shortest=shortest, rough=rough))
         elif options.inducing is None:
-            fitted.append(fit_vhgp(features, columns[k], start=starts[k], shortest=shortest))
+            smooth = mean is not None
+            fitted.append(fit_vhgp(features, columns[k], start=starts[k], shortest=shortest, rough=smooth))
         else:
             fitted.append(fit_sparse_vhgp(features, columns[k], options.inducing))
         chosen.append(fitted[k])

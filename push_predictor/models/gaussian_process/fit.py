@@ -22,7 +22,7 @@ import numpy as np
 
 from push_predictor.errors import TrainingError
 from push_predictor.models.gaussian_process.bound import Bound, SignalFit, Sites, VhgpParameters, VhgpProblem
-from push_predictor.models.gaussian_process.gp import Descent, GpParameters
+from push_predictor.models.gaussian_process.gp import NEAR, Descent, GpParameters
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.types import Array
 
@@ -48,18 +48,25 @@ FEW_ROWS = 100
 
 
 def maximise_bound(
-    inputs: Array, outputs: Array, near: GpParameters, most_iterations: int, shortest: float
+    inputs: Array,
+    outputs: Array,
+    near: GpParameters,
+    most_iterations: int,
+    shortest: float,
+    first: VhgpParameters | None = None,
 ) -> tuple[VhgpParameters, Array]:
     """Hyperparameters where the bound plus the log prior is highest, and the site precisions (n,), tied to them.
 
-    near: a homoscedastic fit of these rows or some of them, where the search starts. shortest: lengthscale of the
-    signal. Raises TrainingError if the bound is not finite at any point of the search.
+    near: a homoscedastic fit of these rows or some of them, about which the prior is. first: where the search starts,
+    the maximum of some of the rows; None: at the prior's centre. shortest: lengthscale of the signal. Raises
+    TrainingError if the bound is not finite at any point of the search.
     """
     d, n = inputs.shape[1], len(outputs)
     box = _box(d, shortest)
     centre = np.clip(_prior_centre(near).to_vector(), *box.T)
     search = Search(partial(VhgpProblem.of, inputs, outputs), Prior(centre, _spread(d, n)), _SEARCH_TOLERANCE)
-    Descent(box, most_iterations, _STOP).run(search.cost, centre)
+    begin, unit = (centre, 1.0) if first is None else (np.clip(first.to_vector(), *box.T), NEAR)
+    Descent(box, most_iterations, _STOP).run(search.cost, begin, unit)
     return search.solved(_FINAL_TOLERANCE)
 
 

@@ -31,7 +31,7 @@ _SIGNAL_BOUNDS = (np.log(1e-3), np.log(1e2))
 _NOISE_BOUNDS = (np.log(1e-3), np.inf)
 _REFUSED = 1e10
 _STOP, _ROUGH_STOP = 1e-6, 1e-4  # relative decrease
-_UNIT = 0.1  # of the logarithms: about the length of the first step from the minimum of some rows
+NEAR = 0.1  # of the logarithms: about the length of the first step from the minimum of some rows
 _SHORT, _SURELY = np.log(0.15), 5.0  # lengthscale to begin with; advantage in nats that it must reach
 _FEWEST_FOR_SHORT = 100  # rows; fewer could be interpolated by short lengthscales
 _FIRST_STEPS = 3  # from each start
@@ -117,7 +117,7 @@ def fit_gp(inputs: Array, outputs: Array, *, shortest: float = SHORTEST, rough: 
     cost = _cost(inputs[rows], outputs[rows])
     found = few.run(cost, _start(cost, inputs[rows].shape, few))
     if not rough and len(rows) < len(outputs):
-        found = whole.run(_cost(inputs, outputs), found.point, _UNIT)
+        found = whole.run(_cost(inputs, outputs), found.point, NEAR)
     return GaussianProcess(inputs, outputs, _parameters(found.point))
 
 

@@ -26,7 +26,7 @@ from push_predictor.models.gaussian_process.fit import (
     Prior,
     Search,
 )
-from push_predictor.models.gaussian_process.gp import Descent, check_rows, some_rows
+from push_predictor.models.gaussian_process.gp import NEAR, Descent, check_rows, some_rows
 from push_predictor.models.gaussian_process.inducing import InducedKernel, inducing_rows
 from push_predictor.models.gaussian_process.prediction import LatentPrediction
 from push_predictor.models.gaussian_process.vhgp import VHGP, fit_vhgp
@@ -39,7 +39,6 @@ _MIDDLE_ROWS = 5000
 _MOST_ITERATIONS = 20
 _SEARCH_TOLERANCE, _FINAL_TOLERANCE, _STOP = 4e-6, 1e-7, 1e-5  # nats a row
 _REACH = np.log(30.0)  # by this factor a hyperparameter may change in a stage
-_UNIT = 0.1  # of the logarithms: about the length of the first step
 
 
 class SparseVHGP(VHGP):
@@ -87,7 +86,7 @@ def fit_sparse_vhgp(inputs: Array, outputs: Array, most_inducing: int = DEFAULT_
     """
     check_rows(inputs, outputs)
     few, more = some_rows(len(outputs), _DENSE_ROWS), some_rows(len(outputs), _MIDDLE_ROWS)
-    coarse = fit_vhgp(inputs[few], outputs[few])
+    coarse = fit_vhgp(inputs[few], outputs[few], rough=True)
     return _refined(_refined(coarse, inputs[more], outputs[more], most_inducing), inputs, outputs, most_inducing)
 
 
@@ -100,7 +99,7 @@ def _refined(rough: VHGP, inputs: Array, outputs: Array, most_inducing: int) -> 
     search = Search(lambda p: problem_about(inputs, outputs, p, *places), prior, tolerance)
     box = np.column_stack([first - _REACH, first + _REACH])
     box[-2, 1] = np.inf  # one open side, see gp.py
-    Descent(box, _MOST_ITERATIONS, _STOP).run(search.cost, first, _UNIT)
+    Descent(box, _MOST_ITERATIONS, _STOP).run(search.cost, first, NEAR)
     try:
         return SparseVHGP(inputs, outputs, *search.solved(_FINAL_TOLERANCE * n), *chosen)
     except (np.linalg.LinAlgError, FloatingPointError) as error:

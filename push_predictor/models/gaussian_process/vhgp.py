@@ -112,12 +112,14 @@ def fit_vhgp(
     start: GpParameters | None = None,
     most_iterations: int = 40,
     shortest: float = SHORTEST,
+    rough: bool = False,
 ) -> VHGP:
     """Maximise the variational bound (plus weak priors, see fit.py) over hyperparameters and site precisions.
 
     inputs (n, D) and outputs (n,) standardised. start: a homoscedastic fit of these rows or some of them; None
-    computes it first. shortest: lengthscale of the signal. Raises TrainingError when the rows do not match or are not
-    finite. The hyperparameters are those of at most MOST_SEARCHED rows.
+    computes it first. shortest: lengthscale of the signal. rough: whether the hyperparameters are those of
+    MOST_SEARCHED rows, for fits that another begins from, and residuals about mechanics, which are smooth. Raises
+    TrainingError when the rows do not match or are not finite.
     """
     check_rows(inputs, outputs)
     rows = some_rows(len(outputs), MOST_SEARCHED)
@@ -126,5 +128,9 @@ def fit_vhgp(
     found = VHGP(*few, *maximise_bound(*few, near, most_iterations, shortest))
     if len(rows) == len(outputs):
         return found
+    if not rough:
+        return VHGP(
+            inputs, outputs, *maximise_bound(inputs, outputs, near, most_iterations, shortest, found.parameters)
+        )
     problem = VhgpProblem.of(inputs, outputs, found.parameters)
     return VHGP(inputs, outputs, found.parameters, precisions_from(problem, found.predict(inputs)))
