@@ -23,7 +23,7 @@ from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, reference_maps
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.painters.trajectories import paint_outcomes
-from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import OUTPUT_NAMES, Section, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import (
     FEWEST_PUSHES,
     OF_BLOCKS,
@@ -54,7 +54,7 @@ NAMED: dict[str, tuple[Place, ...]] = {
 MIRRORED: tuple[Place, ...] = ((0.75, TURNED), (0.25, -TURNED))
 PEAK_CLAIMS = ("forward", "sideways", "turning")  # by output
 ONE_STEP = Bound(high=1.0 + 1e-6)
-QUANTITIES = {"mean": "mean", "sd": "sd of an outcome"}
+QUANTITIES = ("mean", "sd")
 NOTES = (
     "Signs: our contact runs counter-clockwise along the side, our angle counter-clockwise from the inward normal. The "
     "paper mirrors one of the two, so its (0.75, +30°) is our (0.75, −30°). For the rotation it names two places: "
@@ -97,9 +97,8 @@ def section(study: Study) -> Section:
     predicted = np.mean([answer.mean for answer in answers["VHGP"]], axis=0)
     return Section(
         {**peak_evidence(peaks_of(grid, models)), **agreement_evidence(alike)},
-        (_agreement_table(study, alike),),
-        [_picture(study, shown, predicted, quantity) for quantity in ("mean", "sd")],
-        NOTES,
+        pictures=[_picture(study, shown, predicted, quantity) for quantity in ("mean", "sd")],
+        notes=(*NOTES, OF_BLOCKS),
     )
 
 
@@ -179,23 +178,6 @@ def _peaks(
 def _handedness(fractions: Array, angles: Array, turned: Array) -> Array:
     paper, mirrored = (at_places(fractions, angles, turned, at).mean(axis=1) for at in (NAMED["dtheta"], MIRRORED))
     return np.asarray(np.degrees(paper - mirrored))
-
-
-def _agreement_table(study: Study, found: Likenesses) -> Table:
-    """A row per quantity and output: correlation of every model."""
-    models = list(dict.fromkeys(model for _, model in found))
-    rows = [
-        (f"{name}, {what}", *(Number(found[quantity, model][k]) for model in models))
-        for quantity, what in QUANTITIES.items()
-        for k, name in enumerate(OUTPUT_NAMES)
-    ]
-    caption = (
-        "Agreement of the models' maps with those of the repetitions. Simulated square on "
-        f"{study.reference_grid.surface}, {len(study.reference_grid.seen)} pushes; models of {_windows(study)} "
-        f"training windows of another recording, mean over {study.plan.seeds} draws. {OF_BLOCKS} The paper shows the "
-        "maps without numbers."
-    )
-    return Table(caption, ("", *(f"{model}: correlation" for model in models)), rows)
 
 
 def _picture(study: Study, model: ModelMap, predicted: Array, quantity: str) -> Picture:
