@@ -29,6 +29,7 @@ import numpy as np
 
 from benchmarks.blind.recordings import later_spec, rig_of, windows_of
 from benchmarks.blind.scores import wilson
+from benchmarks.support.scripts import parser_of, piped, ruled
 from push_predictor.evaluation.alarm.evidence import AlarmState
 from push_predictor.evaluation.alarm.scores import Calibration, alarm_state, calibrate
 from push_predictor.models.push_model import PushModel
@@ -74,7 +75,7 @@ class Row:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Judge the recordings and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     commands = parser.add_subparsers(required=True)
     command = commands.add_parser("unchanged")
     command.set_defaults(work=_unchanged)
@@ -99,13 +100,13 @@ def _unchanged(options: argparse.Namespace) -> str:
         file.write_text(json.dumps(found, indent=1) + "\n")
         print(file, file=sys.stderr, flush=True)
     rows = [Row(**one) for file in files for one in json.loads(file.read_text())]
-    lines = ["| base | rigs | false alarms | 95 % interval | rigs with one |", "| --- | --- | --- | --- | --- |"]
+    lines = [ruled("| base | rigs | false alarms | 95 % interval | rigs with one |")]
     for kind in KINDS:
         own = [row for row in rows if row.kind == kind]
         false = [row for row in own if row.false]
         low, high = wilson(len(false), len(own))
         rigs, with_one = len({row.seed for row in own}), len({row.seed for row in false})
-        lines.append(f"| {kind} | {rigs} | {len(false)} of {len(own)} | {low:.3f} to {high:.3f} | {with_one} |")
+        lines.append(piped([kind, rigs, f"{len(false)} of {len(own)}", f"{low:.3f} to {high:.3f}", with_one]))
     return "\n".join([*lines, *(f"- {row}" for row in rows if row.false)])
 
 
@@ -115,11 +116,11 @@ def _changed(options: argparse.Namespace) -> str:
         rows.append(row_with_change(seed))
         print(rows[-1], file=sys.stderr, flush=True)
     delays = sorted(row.delay for row in rows if row.delay is not None)
-    lines = ["| event | count | of | 95 % interval |", "| --- | --- | --- | --- |"]
+    lines = [ruled("| event | count | of | 95 % interval |")]
     counts = {"false alarms, before the change": sum(row.false for row in rows), "changes reported": len(delays)}
     for what, count in counts.items():
         low, high = wilson(count, len(rows))
-        lines.append(f"| {what} | {count} | {len(rows)} | {low:.2f} to {high:.2f} |")
+        lines.append(piped([what, count, len(rows), f"{low:.2f} to {high:.2f}"]))
     return "\n".join([*lines, f"\nPushes until the alarm: {', '.join(map(str, delays))}."])
 
 

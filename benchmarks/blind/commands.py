@@ -35,6 +35,8 @@ from benchmarks.blind.oracle import oracle_gain
 from benchmarks.blind.recordings import MODEL, Size, make_one
 from benchmarks.blind.scores import markdown_of, score_of
 from benchmarks.support.making import apart
+from benchmarks.support.scripts import parser_of
+from benchmarks.support.truths import write_truth
 from push_predictor.models.train_learnt import MEANS
 
 CYCLE = (*["none"] * 6, *["wrench"] * 2, *["library"] * 7, *["outside"] * 2, *["measurement"] * 2, "variance")
@@ -131,7 +133,7 @@ def _make_kept(number: int, size: Size, options: argparse.Namespace) -> None:
 
 def _trace_kept(name: str, options: argparse.Namespace) -> None:
     verdict = trace_one(options.data / name, options.alpha, options.without)
-    _write(options.out / f"{name}.json", verdict)
+    write_truth(options.out / f"{name}.json", verdict)
 
 
 def _lacks_oracle(truth: Path) -> bool:
@@ -143,14 +145,7 @@ def _lacks_oracle(truth: Path) -> bool:
 def _oracle_kept(truth: Path, data: Path) -> None:
     known = json.loads(truth.read_text())
     gain = oracle_gain(data / truth.stem / "new", data / truth.stem / MODEL, known)
-    _write(truth, {**known, "oracle_gain": gain})
-
-
-def _write(path: Path, content: dict[str, Any]) -> None:
-    """Write atomically: an interrupted run leaves no incomplete file."""
-    new = path.with_suffix(".new")
-    new.write_text(json.dumps(content, indent=1))
-    new.replace(path)
+    write_truth(truth, {**known, "oracle_gain": gain})
 
 
 def _all(function: Callable[..., None], calls: Sequence[tuple[Any, ...]], cores: int) -> None:
@@ -165,7 +160,7 @@ def _all(function: Callable[..., None], calls: Sequence[tuple[Any, ...]], cores:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     commands = parser.add_subparsers(required=True)
     command = _command(commands, "make", make, out="recordings", truth="truth")
     for name, default in (("seed", 1), ("count", 100), ("training", 500), ("least", 170), ("most", 600)):

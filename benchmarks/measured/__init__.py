@@ -1,7 +1,4 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models against pushes measured by others: the tables of RESULTS.md and docs/results/accuracy.md.
-
-Run `python -m benchmarks.measured` and `python -m benchmarks.measured.ladder`; the models' benchmarks import `square`.
-"""
+"""The residual loop on pushes measured by others. RESULTS.md also has the tables of models on measured pushes."""

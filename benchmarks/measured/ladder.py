@@ -1,49 +1,42 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What an analytical model lacks on measured pushes: `trace`, and the scores of its effects one after another.
+"""What an analytical model lacks on measured pushes: `trace`, and fitted mechanics, on the same held-out pushes.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.measured.ladder --data FOLDER [--kind mit-square|mlab] [--base BASE]
 
 FOLDER has mit_square and mlab. `trace` is called as by its command, with the covariates of the data. It holds out a
 third of the pushes (residuals/evidence/standardised.py) and uses them once, at the end. BASE is the textbook model (an
 ellipsoidal limit surface, contact friction 0.3) or `exact`: the exact forward model with the textbook's parameters and,
-where the names of the recordings state them, the support points. No base is fitted, only its covariance is.
+where the names of the recordings state them, the support points. No base is fitted, only its covariance is. The fitted
+mechanics are those of `train --kind analytical --fit`, of all pushes that are not held out.
 """
 
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.support.scripts import parser_of, piped, ruled
 from push_predictor.evaluation.estimate import by_push, difference_by_push, total_nlpd, total_nmse
-from push_predictor.evaluation.push_scores import PushScores, push_scores
-from push_predictor.models.effects.effect import Effect
+from push_predictor.evaluation.push_scores import push_scores
 from push_predictor.models.mechanics.fitted import FittedMechanics
 from push_predictor.models.mechanics.forward import PushMechanics
 from push_predictor.models.mechanics.pressure import supported_at
-from push_predictor.models.mechanisms import mechanism_named
 from push_predictor.models.push_model import PushModel
-from push_predictor.models.train import train_model
+from push_predictor.models.train import TrainingOptions, train_model
 from push_predictor.models.train_mechanics import predictor_about
 from push_predictor.recordings.importers import import_source
 from push_predictor.recordings.load import different_supports
-from push_predictor.residuals.candidates.candidate import candidate
 from push_predictor.residuals.evidence.loading import LoadedData, load_evidence
-from push_predictor.residuals.evidence.standardised import evidence_of, held_out_rows
-from push_predictor.residuals.extension.extended_model import extend, refit_base
+from push_predictor.residuals.evidence.standardised import held_out_rows
 from push_predictor.residuals.extension.held_out_gain import compared
-from push_predictor.residuals.outcome import Trace
 from push_predictor.residuals.trace import trace
 from push_predictor.types import Array
 
-HEAD = ruled("| step | NMSE, dx dy dtheta | NLPD | NMSE minus the step before | NLPD minus the step before |")
+HEAD = "| model | NMSE (95 %) | NLPD (95 %) | NMSE minus the base (95 %) | NLPD minus the base (95 %) |"
 ORDER = ("row_id", "push_index")  # meaningless in the square's table: its rows are shuffled
 
 
@@ -56,7 +49,7 @@ class Measured:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the steps of each trace."""
+    """Print a table for each kind of data and each base."""
     parser = parser_of(__doc__)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--kind", choices=sorted(LADDERS))
@@ -64,9 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     for kind in [options.kind] if options.kind else sorted(LADDERS):
         measured = load(kind, options.data)
+        mechanics = fitted(measured)
         for base in [options.base] if options.base else sorted(BASES, reverse=True):
             print(f"\n## {kind}, {base} base\n")
-            report(BASES[base](measured), measured.data)
+            report(BASES[base](measured), mechanics, measured.data)
 
 
 def load(kind: str, data: Path) -> Measured:
@@ -110,69 +104,28 @@ def exact(measured: Measured) -> PushModel:
 BASES: dict[str, Callable[[Measured], PushModel]] = {"textbook": textbook, "exact": exact}
 
 
-def report(base: PushModel, data: LoadedData) -> None:
-    """Trace the residual, score the effects one after another on the held-out pushes, and print a row for each."""
-    begin = time.process_time()
+def fitted(measured: Measured) -> PushModel:
+    """Fitted mechanics, on the known supports."""
+    table, options = measured.data.table, TrainingOptions(fit=True, supports=measured.supports)
+    training = table.take(~held_out_rows(table))
+    return train_model(training, measured.data.rig, "analytical", name="fitted mechanics", options=options)
+
+
+def report(base: PushModel, mechanics: PushModel, data: LoadedData) -> None:
+    """Trace the residual, and score base, traced model and fitted mechanics on the held-out pushes."""
     found = trace(base, data)
     table = found.held_out.table
-    searched, digest = len(found.analysis.pushes), found.held_out.digest[:12]
-    print(f"{searched} pushes searched, {len(table.pushes)} held out, sha256 {digest}")
-    print(f"trace: {time.process_time() - begin:.0f} CPU s\n\n{HEAD}")
-    scores = [push_scores(compared(model, table, base.training_mean)) for model in models_of(found)]
-    names = [base.name, *(f"+ {named(effect)}" for effect in found.terms)]
-    for before, after, name in zip([None, *scores], scores, names, strict=False):
-        print(step_row(before, after, name), flush=True)
-    print()
-    p_values = {(reported.mechanism, reported.covariate): reported.p_value for reported in found.effects}
-    for effect in found.terms:
-        p_value = p_values.get((effect.mechanism, effect.covariate))
-        text = "not reported" if p_value is None else f"p {p_value:.1g}"
-        print("\n  ".join([f"{named(effect)}, {text}", *parameters(effect)]))
-
-
-def models_of(found: Trace) -> list[PushModel]:
-    """The refit, and the models with one effect more each, all effects of a model estimated together."""
-    evidence, refit = evidence_of(found.model, found.analysis), refit_base(found.model, found.analysis)
-    candidates = [candidate(evidence, effect.mechanism, effect.covariate, effect.basis) for effect in found.terms]
-    return [refit, *(extend(refit, evidence, candidates[: k + 1]) for k in range(len(candidates)))]
-
-
-def named(effect: Effect) -> str:
-    """The name of an effect for a reader."""
-    return f"{effect.mechanism or 'unknown'} by {effect.covariate} ({effect.basis.name})"
-
-
-def parameters(effect: Effect) -> list[str]:
-    """The coefficients of a mechanism with 95 % intervals; of the generic response only their number."""
-    if effect.mechanism is None:
-        return [f"{len(effect.coefficients)} coefficients of the generic response"]
-    spread = 1.96 * np.sqrt(np.diagonal(effect.covariance))
-    mechanism = mechanism_named(effect.mechanism)
-    columns = len(effect.coefficients) // len(mechanism.parameters)
-    lines = []
-    for k, (value, half) in enumerate(zip(effect.coefficients, spread, strict=True)):
-        parameter = mechanism.parameters[k // columns]
-        interval = f"{value:.4g} ({value - half:.4g} to {value + half:.4g}) {parameter.unit}"
-        lines.append(f"{parameter.name}, {_column(effect, k % columns)}: {interval}")
-    return lines
-
-
-def _column(effect: Effect, k: int) -> str:
-    k -= effect.basis.offset
-    if k < 0:
-        return "constant"
-    if effect.basis.name == "category":
-        return f"{effect.covariate} {effect.basis.levels[k + 1]:g}"
-    return f"column {k + 1} of {effect.basis.name}"
-
-
-def step_row(before: PushScores | None, after: PushScores, name: str) -> str:
-    """The row of a step under HEAD, with paired differences from the step before."""
-    outputs = " ".join(f"{value:.3f}" for value in after.totals().nmse[0])
-    cells = [f"{by_push(after, total_nmse).text('.3f')}, {outputs}", by_push(after, total_nlpd).text()]
-    for figure in (total_nmse, total_nlpd):
-        cells.append("" if before is None else difference_by_push(before, after, figure).text("+.3f"))
-    return piped([name, *cells])
+    effects = ", ".join(f"{effect.mechanism or 'unknown'} by {effect.covariate}" for effect in found.terms)
+    print(
+        f"{len(found.analysis.pushes)} pushes searched, {len(table.pushes)} held out. Found: {effects or 'nothing'}.\n"
+    )
+    models = {base.name: base, "trace": found.extended or base, mechanics.name: mechanics}
+    scores = {name: push_scores(compared(model, table, base.training_mean)) for name, model in models.items()}
+    print(ruled(HEAD))
+    for name, of in scores.items():
+        gains = [difference_by_push(scores[base.name], of, figure).text("+.3f") for figure in (total_nmse, total_nlpd)]
+        cells = [by_push(of, total_nmse).text(".3f"), by_push(of, total_nlpd).text(), *gains]
+        print(piped([name, *cells]), flush=True)
 
 
 if __name__ == "__main__":

@@ -3,46 +3,31 @@
 
 """Processor time of a push by the compiled mechanics, for batches of one to a million pushes.
 
-    python -m benchmarks.models.cost_of_a_push [--most N] [--picture FILE]
+    python -m benchmarks.models.cost_of_a_push [--most N]
 
 A batch is one call of FittedMechanics.displacement: its overhead decides small batches, the kernel large ones. The
-analytical model, and a patch with eight fitted parameters, alone and with inertia, a slope or grain of the table; to
-relative accuracies of 1e-3 and 1e-5. All of one batch size are measured in turns, so that they share the machine's
-load. Also printed: a push alone by PushModel.predict, and the time to tabulate a limit surface.
+analytical model, and a patch with eight fitted parameters, without and with inertia; to relative accuracies of 1e-3
+and 1e-5. All of one batch size are measured in turns, so that they share the machine's load.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks.models.made_up_models import analytical_model, eight_fitted, fitted_model, made_up_table, square_rig
+from benchmarks.models.made_up_models import eight_fitted, square_rig
 from benchmarks.support.scripts import parser_of, piped, ruled
 from push_predictor.blas_threads import one_blas_thread
 from push_predictor.models.mechanics.fitted import FittedMechanics, analytical_mechanics
-from push_predictor.models.mechanics.load_map import load_map
-from push_predictor.models.mechanics.pressure import patch
-from push_predictor.models.push_model import PushModel
-from push_predictor.models.pushes import Pushes
-from push_predictor.reporting.canvas import draw, grid
 from push_predictor.types import Array
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 MOST = 1_000_000
 ACCURACIES = (1e-3, 1e-5)
 CALLS = 2000  # timed at most for each batch size, and each a number of pushes of its own
 PUSHES = 20_000  # timed for each batch size at least
 ROUNDS = 3
-ALONE = "alone, PushModel.predict"
-ADDED = {"inertia": {"inertia": 0.3}, "slope": {"slope_x": 0.1}, "grain": {"grain_x": 0.2}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,31 +44,24 @@ class Asked:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print the table; draw the picture."""
+    """Print the table, microseconds a push, as Markdown."""
     parser = parser_of(__doc__)
     parser.add_argument("--most", type=int, default=MOST, help="pushes of the largest batch (default %(default)s)")
-    parser.add_argument("--picture", type=Path, help="file to draw, such as docs/pictures/cost_of_a_push.png")
-    options = parser.parse_args(arguments)
-    sizes = [10**k for k in range(len(str(options.most)))]
-    cases = _cases()
+    sizes = [10**k for k in range(len(str(parser.parse_args(arguments).most)))]
     with one_blas_thread():
-        costs = measured(cases, asked(options.most), sizes)
-        print(table(costs, sizes))
-        for name, seconds in alone().items():
-            print(f"{ALONE}, {name}: {1e6 * seconds:.0f} us")
-        print(f"tabulation of a patch: {1e3 * tabulation():.0f} ms")
-    if options.picture:
-        draw(options.picture, (5.2, 3.4), partial(_paint, costs, sizes))
+        print(ruled(piped(["mechanics, accuracy", *sizes])))
+        for name, row in measured(_cases(), asked(sizes[-1]), sizes).items():
+            print(piped([name, *(f"{1e6 * seconds:.3g}" for seconds in row)]))
     return 0
 
 
 def _cases() -> dict[str, FittedMechanics]:
-    eight = eight_fitted()
+    eight, rig = eight_fitted(), square_rig()
     kinds = {
-        "analytical": analytical_mechanics(square_rig().outline, square_rig().pusher_radius),
+        "analytical": analytical_mechanics(rig.outline, rig.pusher_radius),
         "eight fitted": eight,
+        "eight and inertia": replace(eight, values={**eight.values, "inertia": 0.3}),
     }
-    kinds |= {f"eight and {name}": replace(eight, values={**eight.values, **more}) for name, more in ADDED.items()}
     return {
         f"{name}, {accuracy:g}": replace(fitted, mechanics=replace(fitted.mechanics, accuracy=accuracy))
         for accuracy in ACCURACIES
@@ -121,52 +99,6 @@ def _seconds(mechanics: FittedMechanics, pushes: Asked, size: int, calls: int) -
     for each in rows:
         pushes.displaced(mechanics, each)
     return process_time() - start
-
-
-def alone() -> dict[str, float]:
-    """Seconds of one PushModel.predict, by model."""
-    training = made_up_table(100, 0)
-    one = Pushes(0.02, 0.1, 0.3, 0.2, {"push_heading": 0.0})
-    models = {"analytical": analytical_model(training), "eight fitted": fitted_model(training)}
-    return {name: min(_of_predict(model, one) for _ in range(ROUNDS)) for name, model in models.items()}
-
-
-def _of_predict(model: PushModel, one: Pushes) -> float:
-    return _processor_time(lambda: [model.predict(one) for _ in range(CALLS)]) / CALLS
-
-
-def tabulation() -> float:
-    """Seconds to tabulate the limit surface of a patch: once for a slider."""
-    pressure = patch(square_rig().outline, 0.0)
-    return min(_processor_time(lambda: load_map(pressure)) for _ in range(ROUNDS))
-
-
-def _processor_time(work: Callable[[], object]) -> float:
-    start = process_time()
-    work()
-    return process_time() - start
-
-
-def table(costs: dict[str, list[float]], sizes: list[int]) -> str:
-    """Microseconds a push, as Markdown."""
-    head = ["mechanics, accuracy", *(f"{size:,}".replace(",", " ") for size in sizes)]
-    rows = [[name, *(f"{1e6 * cost:.3g}" for cost in row)] for name, row in costs.items()]
-    return "\n".join([ruled(piped(head)), *map(piped, rows)])
-
-
-def _paint(costs: dict[str, list[float]], sizes: list[int], figure: Figure) -> None:
-    axes = figure.subplots()
-    for number, (name, row) in enumerate(costs.items()):
-        kind, _, accuracy = name.rpartition(", ")
-        fine = float(accuracy) == min(ACCURACIES)
-        colour = f"C{number % (len(costs) // len(ACCURACIES))}"
-        label = None if fine else kind
-        axes.loglog(sizes, 1e6 * np.array(row), "--" if fine else "-", color=colour, marker=".", lw=1.2, label=label)
-    axes.plot([], [], "-", color="grey", label="accuracy 1e-3")
-    axes.plot([], [], "--", color="grey", label="accuracy 1e-5")
-    axes.set(xlabel="pushes in a batch", ylabel="processor time of a push (µs)")
-    axes.legend(fontsize=6, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    grid(axes)
 
 
 if __name__ == "__main__":

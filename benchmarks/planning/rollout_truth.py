@@ -19,7 +19,6 @@ from push_predictor.types import Array
 
 BRAKING = 0.004  # m of a push's travel that no pose is taken from
 DRAWS = 1000  # of the bootstrap over the repeats
-REGIONS = (0.5, 0.9, 0.95)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,16 +79,8 @@ def weights_of(count: int, seed: int = 0) -> Array:
     return rng.multinomial(count, np.full(count, 1.0 / count), DRAWS).astype(np.float64)
 
 
-def gaussian_divergence(samples: Array, truth: Array) -> float:
-    """KL divergence, nats, of the Gaussian of poses (n, 3) `truth` from that of `samples` (p, 3)."""
-    mean, covariance = truth.mean(axis=0), np.cov(truth.T)
-    off, inverse = mean - samples.mean(axis=0), np.linalg.inv(np.cov(samples.T))
-    ratio = inverse @ covariance
-    return float(0.5 * (np.trace(ratio) - 3.0 - np.log(np.linalg.det(ratio)) + off @ inverse @ off))
-
-
-def inside(samples: Array, truth: Array) -> Array:
-    """Which poses (n, 3) lie in the ellipsoids about the samples' mean that hold REGIONS of the samples: (n, 3)."""
+def covered(samples: Array, truth: Array) -> Array:
+    """Which poses (n, 3) lie in the ellipsoid about the samples' mean that holds 95 % of the samples: (n,)."""
     mean, inverse = samples.mean(axis=0), np.linalg.inv(np.cov(samples.T))
     far, from_there = (np.einsum("ni,ij,nj->n", x - mean, inverse, x - mean) for x in (samples, truth))
-    return np.asarray(from_there[:, None] <= np.quantile(far, REGIONS))
+    return np.asarray(from_there <= np.quantile(far, 0.95))

@@ -41,7 +41,7 @@ def push_features(outline: Outline, inputs: Array) -> Array:
     return features
 
 
-# Measured on nine simulated rigs, three of each simulator of benchmarks/models/other_speeds.py, trained at 20 mm/s and
+# Measured on nine simulated rigs, three of each simulator of benchmarks/models/cases.py, trained at 20 mm/s and
 # asked at 10 to 150 mm/s: the least of 0, 0.1, 0.2, 0.3 and 0.5 with which 95 % intervals of models without mechanics
 # cover 0.92 or more on every rig (0: 0.67). Its mean NLPD is within 0.02 nats of the best, about mechanics too.
 DEVIATION = 0.1

@@ -1,18 +1,16 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The example that pushes a square through a gate, and the tables of the benchmark of the same planner."""
+"""The example that pushes a square through a gate, and the benchmark of the same planner."""
 
 from __future__ import annotations
 
-import json
 import re
 
 import numpy as np
 import pytest
 
-from benchmarks.planning.risk_table import tables
-from benchmarks.planning.risk_tasks import TASKS, problem
+from benchmarks.planning.risk import TASKS, accepted, problem
 from examples import plan_around_obstacles
 from push_predictor.geometry.shapes import shape_outline
 from push_predictor.models.store.model_file import save_model
@@ -34,31 +32,20 @@ def test_example_reaches_the_region(capsys, tmp_path):
 @pytest.mark.parametrize("task", TASKS, ids=lambda task: task.name)
 def test_problems_are_drawn_by_their_number(task):
     first, again, other = (problem(task, number, shape_outline("rect1")) for number in (3, 3, 4))
-    np.testing.assert_array_equal(first.start, again.start)
-    assert not np.array_equal(first.start, other.start)
-    assert first.scene.clearance(first.start) > 0.004
-    assert not first.target.reached(first.start)
+    np.testing.assert_array_equal(first.slider, again.slider)
+    assert not np.array_equal(first.slider, other.slider)
+    assert first.scene.clearance(first.slider) > 0.004
+    assert not first.target.reached(first.slider)
 
 
-def _row(variant, number, result, risk):
-    said = [{"risk": risk, "probability": 1.0 - risk, "planned": 2}]
-    return {"task": "gate", "variant": variant, "problem": number, "result": result, "pushes": 2, "promised": said}
+def test_equal_risk_declines_the_problems_with_the_largest_promised_risk():
+    """Where more risk is promised to the runs that fail, declining them costs no success; else it costs all."""
+    failed = np.arange(40) % 10 < 2
+    np.testing.assert_array_equal(accepted(np.where(failed, 0.3, 0.01), failed), ~failed)
+    assert not accepted(np.full(40, 0.1), failed).any()
 
 
-def test_equal_risk_declines_the_problems_with_the_largest_promised_risk(tmp_path):
-    """The informed variant promises more risk where it fails, so that declining costs it no success."""
-    rows = []
-    for number in range(40):
-        failed = number % 10 < 2
-        result = "failed" if failed else "reached"
-        rows += [
-            _row("constant", number, result, 0.1),
-            _row("input-dependent, push effects", number, result, 0.3 if failed else 0.01),
-        ]
-    (tmp_path / "runs.jsonl").write_text("\n".join(map(json.dumps, rows)))
-    text = tables(tmp_path / "runs.jsonl")
-    assert "40 problems" in text
-    strict = text.split("At most 2 %")[1].split("At most 5 %")[0]
-    assert re.search(r"\| constant \| 0\.0 .*\| 0\.0 ", strict)
-    assert re.search(r"\| input-dependent, push effects \| 80\.0 .*\| 0\.0 .*\| 80\.0 \(", strict)
-    assert re.search(r"\| input-dependent, push effects \| 6\.8 \| 20\.0 .*\| 93 \| 80\.0 .*\| 1\.00 \|", text)
+def test_the_threshold_of_a_half_comes_from_the_other():
+    """The even problems alone fail: none of the odd ones is accepted, and all of the even ones."""
+    even = np.arange(40) % 2 == 0
+    np.testing.assert_array_equal(accepted(np.full(40, 0.1), even), even)

@@ -22,11 +22,13 @@ from ros_harness import free_domain, wait_until
 from synthetic import Push, pose_stream, stamps, translating_push, windows_of
 from validator_bench import hosting_replay, hosting_validator
 
-from benchmarks.measured.scores import total
-from benchmarks.measured.tables import leave_one_run_out, mean_speed, travelled
+from benchmarks.models.accuracy import compared, model_of
+from benchmarks.models.cases import runs_in_turn
+from push_predictor.evaluation.estimate import Figure, total_nlpd, total_nmse
 from push_predictor.evaluation.metrics import nmse
 from push_predictor.evaluation.offline import validate_recording
-from push_predictor.evaluation.validation import metrics_json
+from push_predictor.evaluation.push_scores import pooled, push_scores
+from push_predictor.evaluation.validation import Comparison, compare, metrics_json
 from push_predictor.models.mechanics.fitted import analytical_mechanics
 from push_predictor.models.push_model import PushModel
 from push_predictor.models.store.model_file import save_model
@@ -83,8 +85,11 @@ def test_the_windows_of_a_long_push_add_up_to_what_the_rig_did(
     imported: dict[str, Path], found: dict[str, list[PushWindow]], run: str
 ) -> None:
     recording, windows = read_recording(imported[run]), found[run]
-    way, turn = travelled(windows)
-    assert 0.11 < mean_speed(recording, windows[0].start, windows[-1].end) < 0.15
+    moved = np.array([window.displacement for window in windows])
+    way, turn = np.hypot(*moved[:, :2].T).sum(), moved[:, 2].sum()
+    tip, ends = recording.pusher, [windows[0].start, windows[-1].end]
+    chord = np.hypot(*(np.diff(np.interp(ends, tip.stamp, column))[0] for column in (tip.x, tip.y)))
+    assert 0.11 < chord / (1e-9 * (ends[1] - ends[0])) < 0.15
     assert 0.16 < way < 0.40
     slider = recording.slider
     whole = float(np.unwrap(slider.heading)[-1] - slider.heading[0])
@@ -111,13 +116,42 @@ def test_textbook_physics_explains_the_long_pushes_and_no_mirror_of_them(importe
     assert min(score(1, -1), score(-1, 1), score(-1, -1)) > 1.0
 
 
+def leave_one_run_out(runs: list[Path], kind: str) -> list[Comparison]:
+    """Each run predicted by a model of the others."""
+    return [compared(case, case.training, kind) for case in runs_in_turn(runs)]
+
+
+def total(figure: Figure, *found: Comparison) -> float:
+    """NMSE or NLPD of these runs together."""
+    return float(figure(pooled([push_scores(comparison) for comparison in found]).totals())[0])
+
+
+def test_learnt_from_other_runs_a_model_predicts_an_aluminium_run(imported: dict[str, Path]) -> None:
+    """Plain models of the raw outcomes, about no mechanics: these runs turn both ways, and a VHGP alone learns it."""
+    runs = block_runs(imported, "Al")
+    learnt, physics = (leave_one_run_out(runs, kind) for kind in ("vhgp-plain", "textbook"))
+    assert total(total_nmse, *learnt) < 0.15 and total(total_nmse, *physics) < 0.15
+    assert total(total_nlpd, *learnt) < total(total_nlpd, *physics)
+
+
 def test_a_run_that_turns_as_no_other_lies_outside_the_learnt_domain(imported: dict[str, Path]) -> None:
     """Steel run 3 alone turns clockwise: what a plain model learnt from the others fails there, and says so."""
-    folds = leave_one_run_out(block_runs(imported, "St"), "vhgp")
-    outside = [fold.in_domain.mean() < 0.5 for fold in folds]
-    scores = [total(fold.push_scores, "nmse") for fold in folds]
-    assert outside == [False, False, True, False]
+    cases = runs_in_turn(block_runs(imported, "St"))
+    models = [model_of(case, case.training, "vhgp-plain") for case in cases]
+    asked = [(case.test.inputs, case.test.duration, case.test.covariates) for case in cases]
+    inside = [model.predict_rows(*rows).in_domain.mean() for model, rows in zip(models, asked, strict=True)]
+    scores = [total(total_nmse, compare(model, case.test)) for model, case in zip(models, cases, strict=True)]
+    assert [share < 0.5 for share in inside] == [False, False, True, False]
     assert scores[2] > 1.0 > 0.3 > max(scores[:2] + scores[3:])
+
+
+def test_a_default_model_predicts_even_the_run_that_turns_as_no_other(imported: dict[str, Path]) -> None:
+    """It is learnt about mechanics, which know both directions of turning, and better than textbook mechanics."""
+    runs = block_runs(imported, "St")
+    learnt, textbook = (leave_one_run_out(runs, kind) for kind in ("vhgp", "textbook"))
+    assert max(total(total_nmse, run) for run in learnt) < 0.3
+    assert total(total_nmse, *learnt) < total(total_nmse, *textbook)
+    assert total(total_nlpd, *learnt) < total(total_nlpd, *textbook)
 
 
 # --- through the real nodes -------------------------------------------------------------------------------------

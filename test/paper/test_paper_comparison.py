@@ -135,9 +135,9 @@ def test_sizes_that_end_before_150_decide_nothing():
     assert verdict_on("comparison", "early", evidence) == "not decided"
 
 
-def gains(*signs: int) -> dict[int, list[Estimate]]:
+def gains(*signs: int) -> dict[int, Estimate]:
     """Better (-1), worse (1) or neither (0) at each size."""
-    return {n: [Estimate(0.1 * s, 0.1 * s - 0.05, 0.1 * s + 0.05)] for n, s in zip(SIZES, signs, strict=True)}
+    return {n: Estimate(0.1 * s, 0.1 * s - 0.05, 0.1 * s + 0.05) for n, s in zip(SIZES, signs, strict=True)}
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from push_predictor_paper.data.repetitions import FEWEST, grid_spec, repeat_push
 from push_predictor_paper.plan import FULL, QUICK
 from push_predictor_paper.section import TooFewError
 from push_predictor_paper.sections import divergence, maps, modality, noise
-from push_predictor_paper.sections.data import known, section, speed_counts
+from push_predictor_paper.sections.data import fewest_windows, known, section
 
 from push_predictor.recordings.load import load_data
 from push_predictor.simulation.rig_simulator import SimulationSpec
@@ -112,9 +112,13 @@ def test_section_names_speeds_with_too_few_windows(tmp_path: Path) -> None:
     slow = {pair: replace(s, table=s.table.take(s.table.inputs[:, 0] < 0.06)) for pair, s in missing.sets.items()}
     evidence = section(replace(made_up_study(tmp_path), simulated=replace(missing, sets=slow))).evidence["sets"]
     assert verdict_on("data", "sets", evidence) == "does not hold"
-    counts = speed_counts(PLAN, replace(missing, sets=slow))
-    assert [c.with_window for c in counts] == [16] * 3 + [0] * 7
-    assert [c.pushes for c in counts] == [16] * 10
+
+
+def test_the_poorest_speed_of_a_set_counts() -> None:
+    table = next(iter(made_up_corpus().sets.values())).table
+    speed, counts = np.unique(table.inputs[:, 0], return_counts=True)
+    assert fewest_windows(replace(PLAN, speeds=tuple(speed)), table) == counts.min()
+    assert fewest_windows(replace(PLAN, speeds=(*speed, 0.9)), table) == 0
 
 
 @pytest.mark.slow

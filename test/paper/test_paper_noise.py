@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 from paper_studies import PLAN, made_up_grid, verdict_on
 from push_predictor_paper.data.repetitions import RepeatedGrid
-from push_predictor_paper.fits.map_models import ModelMap
 from push_predictor_paper.sections.noise import (
     Ratios,
     Shape,
     ceiling,
-    learned_figures,
     noise_ratios,
     repeated_shapes,
     shape,
@@ -54,7 +52,6 @@ def test_noise_of_a_known_part_of_the_mean() -> None:
     for part, expected in ((dx, 0.2), (dy, 0.5), (dtheta, 2.0), (whole, np.sqrt(6.0 / 30.0))):
         np.testing.assert_allclose(part.values, expected)
         assert part.overall.value == pytest.approx(expected)
-        np.testing.assert_allclose(part.quantiles, expected)
     assert (dx.within.value, dy.within.value) == (1.0, 0.0)
 
 
@@ -104,22 +101,10 @@ def test_the_shape_is_that_of_the_pair_of_surfaces_that_agrees_least() -> None:
     ],
 )
 def test_the_size_needs_all_outputs_and_most_pushes(overall: tuple[float, float], within: float, verdict: str) -> None:
-    part = Ratios(np.ones(9), (0.1,) * 5, sure(within), Estimate(0.25, *overall))
+    part = Ratios(np.ones(9), sure(within), Estimate(0.25, *overall))
     assert verdict_on("noise", "size", size((part,) * 4)) == verdict
 
 
 def test_the_span_is_that_of_the_output_where_it_is_widest() -> None:
     figures = span({"all": [sure(8.0), sure(12.0), sure(2.0)], "near": [sure(4.0)] * 3}).figures
     assert [figure.estimate.value for figure in figures] == [12.0, 4.0]
-
-
-def test_learned_noise_has_the_size_of_the_truth() -> None:
-    mean, sd = np.full((3, 4, 3), 2.0), np.full((3, 4, 3), 0.5)
-    mean[0, 0] = np.nan
-    sd[1] = 1.0
-    sd[1, 0] = np.nan
-    mean[1, 0] = np.nan
-    rms, median, within, reach = learned_figures([ModelMap(mean, 9.0 * sd, sd, None)] * 2, 1)
-    assert rms.value == pytest.approx(np.sqrt((7 * 0.25 + 3.0) / 10.0) / 2.0)
-    assert (median.value, reach.value) == (0.25, 2.0)
-    assert within.value == pytest.approx(0.7) and within.low == within.high == within.value

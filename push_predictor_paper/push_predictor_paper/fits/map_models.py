@@ -19,7 +19,6 @@ from push_predictor_paper.study import Study
 
 FRACTIONS = np.linspace(0.0055, 0.9945, 41)
 ANGLES = np.linspace(-1.5, 1.5, 61)
-SAME_SPEED = 0.1  # relative; a set needs windows this close to the grid's speed
 Question = tuple[Corpus, Pair, str, int, RepeatedGrid | None]  # kind, seed
 
 
@@ -45,15 +44,6 @@ def surface_maps(study: Study, kind: str) -> dict[str, ModelMap]:
     corpus = study.simulated
     shown = {s: grid for s, grid in study.grids.items() if (grid.shape, s) in corpus.sets}
     return dict(zip(shown, _maps(study, [(corpus, (g.shape, s), kind, 0, g) for s, g in shown.items()]), strict=True))
-
-
-def square_maps(study: Study, corpus: Corpus) -> list[ModelMap]:
-    """Maps of VHGPs of a corpus' reference set if it is a square pushed at about the grid's speed; else empty."""
-    speed = corpus.sets[corpus.reference].table.inputs[:, 0]
-    if corpus.reference[0] != "rect1" or not np.any(np.abs(speed - GRID_SPEED) <= SAME_SPEED * GRID_SPEED):
-        return []
-    grid = study.reference_grid if corpus is study.simulated else None
-    return _maps(study, [(corpus, corpus.reference, "vhgp", seed, grid) for seed in range(study.plan.seeds)])
 
 
 def averaged(models: Sequence[ModelMap]) -> ModelMap:

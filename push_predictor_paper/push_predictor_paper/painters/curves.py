@@ -58,8 +58,8 @@ class Line:
 class Panel:
     """One pair of axes, the horizontal one logarithmic.
 
-    ratio: a logarithmic vertical axis; zero: a line at 0; shaded: a range of x; levels, places: horizontal and vertical
-    lines by name; crossings: colour and place, marked at the foot; limits: of the vertical axis.
+    ratio: a logarithmic vertical axis; shaded: a range of x; levels: horizontal lines by
+    name; crossings: colour and place, marked at the foot; limits: of the vertical axis.
     """
 
     title: str
@@ -68,10 +68,8 @@ class Panel:
     lines: Sequence[Line]
     ticks: Sequence[float] = ()
     ratio: bool = False
-    zero: bool = False
     shaded: tuple[float, float] | None = None
     levels: Mapping[str, float] = field(default_factory=dict)
-    places: Mapping[str, float] = field(default_factory=dict)
     crossings: Sequence[tuple[str, Crossing]] = ()
     limits: tuple[float, float] | None = None
 
@@ -110,14 +108,10 @@ def _paint(ax: Axes, panel: Panel) -> None:
         ax.set_yscale("log")
         ax.set_yticks(TICKS, [f"{tick:g}" for tick in TICKS])
         ax.set_yticks([], minor=True)
-    if panel.zero:
-        ax.axhline(0.0, color="0.2", linewidth=0.8, linestyle=":")
     if panel.shaded is not None:
         ax.axvspan(*panel.shaded, color="0.88", linewidth=0.0, zorder=0)
     for (name, level), dashes in zip(panel.levels.items(), ("--", ":"), strict=False):
         ax.axhline(level, color="0.2", linewidth=0.9, linestyle=dashes, label=name)
-    for name, place in panel.places.items():
-        ax.axvline(place, color="black", linewidth=1.0, linestyle=":", label=name)
     for line in panel.lines:
         _paint_line(ax, line)
     for k, (colour, where) in enumerate(panel.crossings):
@@ -159,7 +153,7 @@ def _limit(ax: Axes, panels: Sequence[Panel]) -> None:
     values = np.array([p.value for line in lines for p in line.points if np.isfinite(p.value)])
     if first.limits is not None:
         ax.set_ylim(*first.limits)
-    if not values.size or first.zero or first.limits is not None:
+    if not values.size or first.limits is not None:
         return
     lows = [p.low for line in lines for p in line.points if not line.thin and np.isfinite(p.low)]
     least = min(lows, default=values.min())

@@ -27,8 +27,8 @@ from push_predictor.types import Array
 from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.fits.crossing import Crossing, crossing
 from push_predictor_paper.fits.curves import Curves, curves
-from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, SPLIT_SHORT, SPLIT_WORDS, SPLITS, SplitName
-from push_predictor_paper.painters.curves import KIND_LOOKS, LOOKS, Line, Panel, paint_curves
+from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, SPLIT_WORDS, SPLITS, SplitName
+from push_predictor_paper.painters.curves import KIND_LOOKS, Line, Panel, paint_curves
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Evidence, Figure
@@ -44,7 +44,6 @@ NOTES = (
     "learned models overtake it is therefore a property of the simulated rig and its speeds.",
 )
 Sizes = Mapping[SplitName, Sequence[int]]
-Gains = Mapping[SplitName, Mapping[int, Sequence[Estimate]]]  # by split and size: total, dx, dy, dtheta
 Crossings = Mapping[SplitName, Mapping[str, Crossing]]  # by split and kind
 
 
@@ -56,15 +55,13 @@ def section(study: Study, corpus: Corpus) -> Section:
         raise TooFewError(f"{corpus.name}: too few windows to compare models.")
     last = {split: max([n for n in sizes[split] if n <= study.plan.size]) for split in SPLITS}
     where = crossings_of(corpus, found, sizes)
-    gains = {split: {n: _gains(corpus, found, split, n) for n in sizes[split]} for split in SPLITS}
+    learned = {n: [found.push_scores(corpus.reference, kind, "push", n) for kind in LEARNED] for n in sizes["push"]}
+    gains = {n: difference_by_push(gp, vhgp, total_nmse) for n, (gp, vhgp) in learned.items()}
+    tables = [_table(corpus, found, split, last[split]) for split in SPLITS]
     return Section(
-        {**comparison_evidence(corpus, found, where["push"], last["push"]), "mean_gain": improves(gains["push"])},
-        (
-            *(_table(corpus, found, split, last[split]) for split in SPLITS),
-            _paper_table(corpus, found, last["push"]),
-            _gain_table(corpus, gains),
-        ),
-        (_picture(study, corpus, found, sizes, where), _gain_picture(study, corpus, gains)),
+        {**comparison_evidence(corpus, found, where["push"], last["push"]), "mean_gain": improves(gains)},
+        (*tables, _paper_table(corpus, found, last["push"])),
+        (_picture(study, corpus, found, sizes, where),),
         NOTES,
     )
 
@@ -105,22 +102,16 @@ def comparison_evidence(corpus: Corpus, found: Curves, where: Mapping[str, Cross
     }
 
 
-def improves(gains: Mapping[int, Sequence[Estimate]]) -> Evidence:
-    """Does input-dependent noise improve the mean, by push, at the largest size?"""
-    better = [str(n) for n, gain in gains.items() if gain[0].high < 0.0]
-    worse = [str(n) for n, gain in gains.items() if gain[0].low > 0.0]
+def improves(gains: Mapping[int, Estimate]) -> Evidence:
+    """Does input-dependent noise improve the mean at the largest size? gains: NMSE of the VHGP minus that of the GP."""
+    better = [str(n) for n, gain in gains.items() if gain.high < 0.0]
+    worse = [str(n) for n, gain in gains.items() if gain.low > 0.0]
     note = (
         f"n = {max(gains)}, the largest size, {SPLIT_WORDS['push']}, interval by push. The whole interval is below 0 "
         f"at n = {', '.join(better) or 'none'}, above at {', '.join(worse) or 'none'} (of {len(gains)} sizes, not "
         "corrected for their number)."
     )
-    return Evidence([Figure("", gains[max(gains)][0])], note)
-
-
-def _gains(corpus: Corpus, found: Curves, split: SplitName, n: int) -> list[Estimate]:
-    """NMSE of the VHGP minus that of the GP: total, dx, dy, dtheta."""
-    gp, vhgp = (found.push_scores(corpus.reference, kind, split, n) for kind in LEARNED)
-    return [difference_by_push(gp, vhgp, output_statistic("nmse", output)) for output in (None, 0, 1, 2)]
+    return Evidence([Figure("", gains[max(gains)])], note)
 
 
 def output_statistic(measure: str, output: int | None) -> Statistic:
@@ -167,45 +158,6 @@ def _paper_table(corpus: Corpus, found: Curves, n: int) -> Table:
     )
     head = ("", *(f"{KIND_NAMES[kind]}, {whose}" for whose in ("paper", "here") for kind in KINDS))
     return Table(caption, head, tuple(rows))
-
-
-def _gain_table(corpus: Corpus, gains: Gains) -> Table:
-    rows = [
-        (f"{n}, {SPLIT_SHORT[split]}", *(Number(gain, ".3f") for gain in gains[split][n]))
-        for split in SPLITS
-        for n in gains[split]
-    ]
-    caption = (
-        f"NMSE of the VHGP minus that of the GP; below 0 the VHGP's mean is better. {corpus.reference_name}, pushes: "
-        f"{corpus.name}. Intervals by push, paired. The paper: 0.37 minus 0.38, total."
-    )
-    return Table(caption, ("n", "total", *OUTPUTS), rows)
-
-
-def _gain_picture(study: Study, corpus: Corpus, gains: Gains) -> Picture:
-    rows = [
-        [
-            Panel(
-                SPLIT_WORDS[split],
-                "training windows n",
-                "NMSE, VHGP minus GP",
-                [
-                    Line(name, LOOKS[k], list(gains[split]), [gain[k] for gain in gains[split].values()])
-                    for k, name in enumerate(("total", *OUTPUTS))
-                ],
-                list(gains[split]),
-                zero=True,
-            )
-            for split in SPLITS
-        ]
-    ]
-    return picture(
-        study.file("mean_gain", corpus),
-        (7.4, 3.4),
-        partial(paint_curves, rows=rows),
-        "Difference in NMSE between VHGP and GP over training size, total and per output. Below 0 the VHGP's mean is "
-        f"better. Bands: 95 % intervals by push. {corpus.reference_name}, pushes: {corpus.name}.",
-    )
 
 
 def _picture(study: Study, corpus: Corpus, found: Curves, sizes: Sizes, where: Crossings) -> Picture:

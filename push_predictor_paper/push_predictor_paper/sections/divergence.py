@@ -19,7 +19,6 @@ from push_predictor.types import Array
 from push_predictor_paper.data.repetitions import RepeatedGrid
 from push_predictor_paper.fits.fit import KIND_NAMES, KINDS, Answer
 from push_predictor_paper.fits.map_models import reference_maps
-from push_predictor_paper.painters.curves import KIND_LOOKS, Panel, cumulative, paint_curves
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import OF_BLOCKS, Statistic, block_weights, by_blocks, mean_of, median_of
@@ -45,24 +44,16 @@ NOTES = (
 class Divergences:
     """Of p pushes from models of s seeds, (s, p), three outputs together: nats.
 
-    of_mean: the part of wrong means; sd_ratio (s, p, 3) of model and repetitions. weights (d, p): draws of blocks of
-    neighbouring pushes, which share the error of a model.
+    weights (d, p): draws of blocks of neighbouring pushes, which share the error of a model.
     """
 
     correct: Array
     printed: Array
-    of_mean: Array
-    sd_ratio: Array
     weights: Array
-
-    @property
-    def of_sd(self) -> Array:
-        """The part of the divergence (s, p) that remains with exact means."""
-        return np.asarray(self.correct - self.of_mean)
 
 
 def section(study: Study) -> Section:
-    """The paper's table, and maps and distribution of the divergence."""
+    """The paper's table, and maps of the divergence."""
     grid = study.reference_grid
     if not grid.seen:
         raise TooFewError("No push of the grid has enough repetitions for a mean and a standard deviation.")
@@ -74,7 +65,7 @@ def section(study: Study) -> Section:
     return Section(
         {**{name: nearer(name, found) for name in STATISTICS}, "good": good},
         (_table(study, found, floor),),
-        (_maps(study, grid, found), _curves(study, grid, found, floor)),
+        (_maps(study, grid, found),),
         NOTES,
     )
 
@@ -84,8 +75,7 @@ def divergences(grid: RepeatedGrid, answers: Sequence[Answer]) -> Divergences:
     mean, sd = (np.array([getattr(cell, what) for cell in grid.seen]) for what in ("mean", "sd"))
     model_mean, model_sd = (np.array([getattr(answer, what) for answer in answers]) for what in ("mean", "sd"))
     correct, printed = (kl(mean, sd, model_mean, model_sd).sum(axis=2) for kl in (gaussian_kl, printed_kl))
-    of_mean = kl_of_mean(mean, model_mean, model_sd).sum(axis=2)
-    return Divergences(correct, printed, of_mean, model_sd / sd, block_weights(grid.seen))
+    return Divergences(correct, printed, block_weights(grid.seen))
 
 
 def gaussian_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> Array:
@@ -94,12 +84,7 @@ def gaussian_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> A
     mean and model_mean in one unit, which drops out; sd and model_sd > 0 in the same.
     """
     ratio = (sd / model_sd) ** 2
-    return 0.5 * (ratio - 1.0 - np.log(ratio)) + kl_of_mean(mean, model_mean, model_sd)
-
-
-def kl_of_mean(mean: Array, model_mean: Array, model_sd: Array) -> Array:
-    """The part of `gaussian_kl` due to the difference of the means; the rest is due to the standard deviations."""
-    return np.asarray(0.5 * ((mean - model_mean) / model_sd) ** 2)
+    return np.asarray(0.5 * (ratio - 1.0 - np.log(ratio)) + 0.5 * ((mean - model_mean) / model_sd) ** 2)
 
 
 def printed_kl(mean: Array, sd: Array, model_mean: Array, model_sd: Array) -> Array:
@@ -148,31 +133,16 @@ def _table(study: Study, of: Mapping[str, Divergences], floor: float) -> Table:
     rows: list[tuple[object, ...]] = []
     for kind, d in of.items():
         numbers = [estimate(values, s, d.weights) for values in (d.correct, d.printed) for s in STATISTICS.values()]
-        numbers += [estimate(values, mean_of, d.weights) for values in (d.of_mean, d.of_sd)]
-        seeds = (f"{v.min():.2f} to {v.max():.2f}" for v in (by_seed(d.correct, s) for s in STATISTICS.values()))
-        ratios = " / ".join(f"{r:.2f}" for r in np.median(d.sd_ratio, axis=(0, 1)))
-        rows.append((KIND_NAMES[kind], *map(Number, numbers), *seeds, ratios, *PAPER.get(kind, ("–", "–"))))
-    head = (
-        "model",
-        "mean KL",
-        "median KL",
-        "mean, formula as printed",
-        "median, formula as printed",
-        "mean KL of wrong means",
-        "mean KL of wrong sds",
-        "mean KL over seeds",
-        "median KL over seeds",
-        "sd predicted / seen, median (dx / dy / rotation)",
-        "paper: mean (other data)",
-        "paper: median (other data)",
-    )
+        rows.append((KIND_NAMES[kind], *map(Number, numbers), *PAPER.get(kind, ("–", "–"))))
+    ours = ("mean KL", "median KL", "mean, formula as printed", "median, formula as printed")
+    head = ("model", *ours, "paper: mean (other data)", "paper: median (other data)")
     caption = (
         f"KL (nats, three outputs) of models from {len(study.reference_grid.seen)} simulated pushes of the grid, "
         f"{study.plan.repetitions} repetitions each. Models of windows of all speeds of "
         f"{study.simulated.reference_name}, none of the grid; mean of {study.plan.seeds} seeds. {OF_BLOCKS} "
-        "Over seeds: least to largest. A perfect model: the expected KL with so many repetitions."
+        "A perfect model: the expected KL with so many repetitions."
     )
-    return Table(caption, head, (*rows, ("a perfect model", f"{floor:.3f}", *("–",) * 10)))
+    return Table(caption, head, (*rows, ("a perfect model", f"{floor:.3f}", *("–",) * 5)))
 
 
 def _maps(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences]) -> Picture:
@@ -190,25 +160,4 @@ def _maps(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences]) -> Pi
         partial(paint_maps, rows=[("", maps)]),
         f"Maps of the KL divergence over contact and angle for GP and VHGP. {len(grid.seen)} simulated pushes on "
         f"{grid.surface}, three outputs, mean of {study.plan.seeds} seeds, one log scale; grey: too few repetitions.",
-    )
-
-
-def _curves(study: Study, grid: RepeatedGrid, of: Mapping[str, Divergences], floor: float) -> Picture:
-    lines = [cumulative(KIND_NAMES[kind], KIND_LOOKS[kind], of[kind].correct.mean(axis=0)) for kind in KINDS]
-    ticks = [t for t in (0.03, 0.1, 0.3, 1, 3, 10, 30, 100, 300) if t <= max(max(line.x) for line in lines)]
-    panel = Panel(
-        "",
-        "KL (nats, three outputs)",
-        "cumulative share of pushes (%)",
-        lines,
-        ticks,
-        places={f"perfect model: {floor:.3f}": floor},
-        limits=(0.0, 100.0),
-    )
-    return picture(
-        study.out / "divergence.png",
-        (6.4, 3.4),
-        partial(paint_curves, rows=[[panel]]),
-        f"Distribution of the KL divergence over pushes, for each model. {len(grid.seen)} simulated pushes on "
-        f"{grid.surface}, mean of {study.plan.seeds} seeds. Dotted: expected value of a perfect model.",
     )

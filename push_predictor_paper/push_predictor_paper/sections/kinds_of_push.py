@@ -17,7 +17,7 @@ from push_predictor_paper.claims import LEVEL
 from push_predictor_paper.data.repetitions import DRAWS, FEWEST, STEP, RepeatedGrid, Repetitions
 from push_predictor_paper.painters.trajectories import Trajectories, paint_trajectories
 from push_predictor_paper.plan import GRID_SPEED
-from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text
+from push_predictor_paper.section import Section, TooFewError, picture, speed_text
 from push_predictor_paper.statistics.grid_maps import place_text
 from push_predictor_paper.statistics.modes import FAR, count_with_modes, dip_tests, found_at
 from push_predictor_paper.study import Study
@@ -52,7 +52,7 @@ class Kinds:
     """A grid's pushes that move the slider to their end, with their whole paths.
 
     convergent, divergent, modal: indices of the chosen pushes. p (p, 3): family-wise p values of the dip of final x, y
-    and heading. dropped: number of pushes of the grid that are not among them.
+    and heading.
     """
 
     cells: tuple[Repetitions, ...]
@@ -61,7 +61,6 @@ class Kinds:
     divergent: int
     modal: int
     p: Array
-    dropped: int
 
     def test_half(self, push: int) -> Array:
         """The repetitions of a push that did not choose it."""
@@ -70,11 +69,11 @@ class Kinds:
 
 def section(study: Study) -> Section:
     """Choose a push of each kind, draw its trajectories, and test whether the kinds exist."""
-    grid, kinds = study.reference_grid, kinds_of(study.reference_grid)
+    kinds = kinds_of(study.reference_grid)
     if kinds is None:
         raise TooFewError(f"Fewer than two pushes moved the slider by {1e3 * LEAST_TRAVEL:.0f} mm and up to their end.")
     evidence = {"growth": growth_evidence(kinds), "apart": apart_evidence(kinds), "modes": modes_evidence(kinds)}
-    return Section(evidence, (_table(grid, kinds),), (_picture(study, kinds),), NOTES)
+    return Section(evidence, pictures=(_picture(study, kinds),), notes=NOTES)
 
 
 def growth_evidence(kinds: Kinds) -> Evidence:
@@ -110,54 +109,16 @@ def modes_evidence(kinds: Kinds) -> Evidence:
     return Evidence([Figure("", count_with_modes(several, power), text=f"{several} of {len(kinds.p)}")], note)
 
 
-def _table(grid: RepeatedGrid, kinds: Kinds) -> Table:
-    """A row for each of the three pushes."""
-    rows = tuple(
-        (
-            name,
-            place_text((kinds.cells[k].fraction, kinds.cells[k].angle)),
-            len(paths),
-            *(Number(of_draws(*resampled(paths, figure)), form) for figure, form in COLUMNS),
-            f"{kinds.p[k].min():.2g}",
-        )
-        for name, k, paths in _three(kinds)
-    )
-    broken = sum(len(c.paths) - len(p) for c, p in zip(kinds.cells, kinds.paths, strict=True))
-    caption = (
-        f"The three pushes of the grid on {grid.surface}, simulated, 1 cm at {speed_text(GRID_SPEED)}. Chosen "
-        f"among {len(kinds.cells)} that move the slider to their end ({kinds.dropped} do not, or begin at a corner). "
-        f"Intervals resample repetitions; for the first two, the half that did not choose them. {broken} of "
-        f"{sum(len(c.paths) for c in kinds.cells)} repetitions are dropped, see below."
-    )
-    head = (
-        "push",
-        "contact (of the side), angle",
-        "repetitions",
-        "displacement (mm)",
-        "spread half-way (mm)",
-        "spread at the end (mm)",
-    )
-    return Table(caption, (*head, "relative spread (%)", "growth", "p of the dip, family-wise"), rows)
-
-
-def _three(kinds: Kinds) -> tuple[tuple[str, int, Array], ...]:
-    """Name, place and test repetitions of each of the three pushes."""
-    return (
-        ("most convergent", kinds.convergent, kinds.test_half(kinds.convergent)),
-        ("most divergent", kinds.divergent, kinds.test_half(kinds.divergent)),
-        ("largest dip", kinds.modal, kinds.paths[kinds.modal]),
-    )
-
-
 def _picture(study: Study, kinds: Kinds) -> Picture:
     grid = study.reference_grid
+    three = {"most convergent": kinds.convergent, "most divergent": kinds.divergent, "largest dip": kinds.modal}
     shown = [
         Trajectories(
             f"{name}: {place_text((kinds.cells[k].fraction, kinds.cells[k].angle))}",
             kinds.cells[k].inputs.mean(axis=0),
             kinds.paths[k],
         )
-        for name, k, _ in _three(kinds)
+        for name, k in three.items()
     ]
     return picture(
         study.out / "kinds_of_push.png",
@@ -181,7 +142,7 @@ def kinds_of(grid: RepeatedGrid) -> Kinds | None:
     order = np.argsort([growth(one[::2]) for one in paths])
     alone, p = dip_tests([one[:, -1] for one in paths])
     modal = int(np.argmin(alone.min(axis=1)))
-    return Kinds(cells, paths, int(order[0]), int(order[-1]), modal, p, len(grid.cells) - len(kept))
+    return Kinds(cells, paths, int(order[0]), int(order[-1]), modal, p)
 
 
 def to_the_end(paths: Array) -> bool:
@@ -233,12 +194,3 @@ def resampled(paths: Array, figure: OfPaths, seed: int = 0) -> tuple[float, Arra
 
 def _middle(paths: Array) -> int:
     return int(paths.shape[-2]) // 2
-
-
-COLUMNS: tuple[tuple[OfPaths, str], ...] = (
-    (lambda paths: 1e3 * travel(paths[:, -1]), ".2f"),
-    (lambda paths: 1e3 * spread(paths[:, _middle(paths), :2]), ".2f"),
-    (lambda paths: 1e3 * final_spread(paths), ".2f"),
-    (lambda paths: 100.0 * relative_spread(paths), ".1f"),
-    (growth, ".2f"),
-)

@@ -23,7 +23,7 @@ from push_predictor_paper.fits.fit import Answer
 from push_predictor_paper.fits.map_models import ANGLES, FRACTIONS, ModelMap, averaged, reference_maps
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.painters.trajectories import paint_outcomes
-from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture
+from push_predictor_paper.section import OUTPUT_NAMES, Section, TooFewError, picture
 from push_predictor_paper.statistics.grid_maps import (
     FEWEST_PUSHES,
     OF_BLOCKS,
@@ -36,7 +36,6 @@ from push_predictor_paper.statistics.grid_maps import (
     peak,
     place_text,
     redrawn,
-    relative_error,
     unbiased,
 )
 from push_predictor_paper.study import Study
@@ -55,7 +54,7 @@ NAMED: dict[str, tuple[Place, ...]] = {
 MIRRORED: tuple[Place, ...] = ((0.75, TURNED), (0.25, -TURNED))
 PEAK_CLAIMS = ("forward", "sideways", "turning")  # by output
 ONE_STEP = Bound(high=1.0 + 1e-6)
-QUANTITIES = {"mean": "mean", "sd": "sd of an outcome", "process_sd": "sd of the process noise alone"}
+QUANTITIES = ("mean", "sd")
 NOTES = (
     "Signs: our contact runs counter-clockwise along the side, our angle counter-clockwise from the inward normal. The "
     "paper mirrors one of the two, so its (0.75, +30°) is our (0.75, −30°). For the rotation it names two places: "
@@ -65,7 +64,7 @@ NOTES = (
     "rotation are largest. That dx is largest where a push goes through the middle and sticks is geometry: along that "
     "ridge it varies by fractions of a per cent.",
     "The sd of an outcome, of VHGP and GP, includes noise and the uncertainty of the mean, as in the paper's maps. "
-    "Repetitions show the noise alone. The table lists both.",
+    "Repetitions show the noise alone.",
 )
 
 
@@ -81,19 +80,7 @@ class Peaks:
     handedness: tuple[Estimate, Estimate]
 
 
-@dataclass(frozen=True)
-class Likeness:
-    """Agreement of one map of a model with that of the repetitions.
-
-    error: squared error over the map's variance. size: root mean square of the model over that of the repetitions.
-    """
-
-    correlation: Estimate
-    error: Estimate
-    size: float
-
-
-Likenesses = Mapping[tuple[str, str], tuple[Likeness, ...]]  # (quantity, model) -> by output
+Likenesses = Mapping[tuple[str, str], Sequence[Estimate]]  # by quantity and model: correlations of the outputs
 
 
 def section(study: Study) -> Section:
@@ -110,9 +97,8 @@ def section(study: Study) -> Section:
     predicted = np.mean([answer.mean for answer in answers["VHGP"]], axis=0)
     return Section(
         {**peak_evidence(peaks_of(grid, models)), **agreement_evidence(alike)},
-        (_agreement_table(study, alike),),
-        [_picture(study, shown, predicted, quantity) for quantity in ("mean", "sd")],
-        NOTES,
+        pictures=[_picture(study, shown, predicted, quantity) for quantity in ("mean", "sd")],
+        notes=(*NOTES, OF_BLOCKS),
     )
 
 
@@ -153,29 +139,30 @@ def peak_evidence(peaks: Peaks) -> dict[str, Evidence]:
 
 
 def likenesses(cells: list[Repetitions], answers: Mapping[str, Sequence[Answer]]) -> Likenesses:
-    """Agreement in mean, sd of an outcome and sd of the noise alone, for each model at these pushes.
+    """Correlations of the models' maps of mean and sd of an outcome with those of the repetitions, at these pushes.
 
     answers: by model, one for each draw of its training windows; the results are averaged over them.
     """
-    truth = {"mean": np.array([cell.mean for cell in cells]), "sd": np.array([cell.sd for cell in cells])}
-    truth["process_sd"], weights = truth["sd"], block_weights(cells)
+    weights = block_weights(cells)
+
+    def alike(quantity: str, draws: Sequence[Answer], k: int) -> Estimate:
+        known = np.array([getattr(cell, quantity)[k] for cell in cells])
+        shown = [getattr(answer, quantity)[:, k] for answer in draws]
+        return by_blocks(lambda w: np.mean([correlation(model, known, w) for model in shown], axis=0), weights)
+
     return {
-        (quantity, model): tuple(
-            _likeness([getattr(answer, quantity)[:, k] for answer in draws], known[:, k], weights) for k in range(3)
-        )
-        for quantity, known in truth.items()
+        (quantity, model): [alike(quantity, draws, k) for k in range(3)]
+        for quantity in QUANTITIES
         for model, draws in answers.items()
     }
 
 
 def agreement_evidence(found: Likenesses) -> dict[str, Evidence]:
     """Do the maps of mean and of standard deviation agree?"""
-    plain = ", ".join(f"{n} {like.correlation.text()}" for n, like in zip(OUTPUT_NAMES, found["sd", "GP"], strict=True))
+    plain = ", ".join(f"{name} {like.text()}" for name, like in zip(OUTPUT_NAMES, found["sd", "GP"], strict=True))
     notes = {"mean": "", "sd": f"The GP has one noise level for all pushes: {plain}."}
     return {
-        f"{quantity}_map": Evidence(
-            [Figure(n, like.correlation) for n, like in zip(OUTPUT_NAMES, found[quantity, "VHGP"], strict=True)], note
-        )
+        f"{quantity}_map": Evidence(list(map(Figure, OUTPUT_NAMES, found[quantity, "VHGP"])), note)
         for quantity, note in notes.items()
     }
 
@@ -191,36 +178,6 @@ def _peaks(
 def _handedness(fractions: Array, angles: Array, turned: Array) -> Array:
     paper, mirrored = (at_places(fractions, angles, turned, at).mean(axis=1) for at in (NAMED["dtheta"], MIRRORED))
     return np.asarray(np.degrees(paper - mirrored))
-
-
-def _likeness(models: Sequence[Array], truth: Array, weights: Array) -> Likeness:
-    size = float(np.mean([np.sqrt(np.mean(model**2) / np.mean(truth**2)) for model in models]))
-
-    def over_draws(figure: Callable[[Array, Array, Array], Array]) -> Estimate:
-        return by_blocks(lambda w: np.mean([figure(model, truth, w) for model in models], axis=0), weights)
-
-    return Likeness(over_draws(correlation), over_draws(relative_error), size)
-
-
-def _agreement_table(study: Study, found: Likenesses) -> Table:
-    """A row per quantity and output: correlation, NMSE and RMS ratio of every model."""
-    models = list(dict.fromkeys(model for _, model in found))
-    rows = []
-    for quantity, what in QUANTITIES.items():
-        for k, name in enumerate(OUTPUT_NAMES):
-            likes = [found[quantity, model][k] for model in models]
-            cells: list[object] = []
-            for like in likes:
-                cells += [Number(like.correlation), Number(like.error), f"{like.size:.2f}"]
-            rows.append((f"{name}, {what}", *cells))
-    caption = (
-        "Agreement of the models' maps with those of the repetitions. Simulated square on "
-        f"{study.reference_grid.surface}, {len(study.reference_grid.seen)} pushes; models of {_windows(study)} "
-        f"training windows of another recording, mean over {study.plan.seeds} draws. NMSE: squared error over the "
-        f"map's variance. RMS ratio: model over repetitions. {OF_BLOCKS} The paper shows the maps without numbers."
-    )
-    head = ("", *(f"{model}: {what}" for model in models for what in ("correlation", "NMSE", "RMS ratio")))
-    return Table(caption, head, tuple(rows))
 
 
 def _picture(study: Study, model: ModelMap, predicted: Array, quantity: str) -> Picture:

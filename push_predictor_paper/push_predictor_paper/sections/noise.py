@@ -16,10 +16,9 @@ from push_predictor.evaluation.estimate import Estimate
 from push_predictor.evaluation.report.maps import ColourScale
 from push_predictor.reporting.canvas import SYMBOLS, Picture
 from push_predictor.types import Array
-from push_predictor_paper.data.corpus import Corpus
 from push_predictor_paper.data.repetitions import RepeatedGrid, Repetitions
-from push_predictor_paper.estimate import of_ends, over_seeds
-from push_predictor_paper.fits.map_models import ModelMap, square_maps, surface_maps
+from push_predictor_paper.estimate import of_ends
+from push_predictor_paper.fits.map_models import ModelMap, surface_maps
 from push_predictor_paper.painters.curves import LOOKS, Panel, cumulative, paint_curves
 from push_predictor_paper.painters.maps import Map, paint_maps
 from push_predictor_paper.section import OUTPUT_NAMES, Number, Section, Table, TooFewError, picture
@@ -41,14 +40,13 @@ WIDE = 1.0  # rad; beyond it the tip soon slides along the side
 NAMES = (*OUTPUT_NAMES, "whole motion")
 MOSTLY = Bound(low=0.8)  # of the pushes
 LOW, HIGH = 0.1, 0.4  # of the expected output, the paper's
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 NOTES = (
     "All surfaces of the simulator share one mechanism of noise and one slider; they differ in its parameters. That "
     "the noise has the same shape on all surfaces therefore holds partly by construction, and its size follows from "
     "strengths that we chose. Only where it is large and where small follows from the mechanics.",
     "Repetitions are at one speed, 20 mm/s. The paper's order of magnitude is also over speeds.",
     "|mean| of dy and of the rotation passes through zero between pushes, where the ratio has no meaning. The table "
-    "therefore shows quantiles, root mean squares, and the whole motion (rotation times the radius of gyration). "
+    "therefore shows root mean squares, and the whole motion (rotation times the radius of gyration). "
     f"Beyond {in_degrees(WIDE)} the slider hardly moves, so the noise is small there.",
 )
 
@@ -57,12 +55,11 @@ NOTES = (
 class Ratios:
     """sd over |mean| of m pushes, of one output or of the whole motion.
 
-    values (m,); quantiles: of these; within: share of the pushes between 10 and 40 %; overall: root mean square of
-    the sd over that of the mean.
+    values (m,); within: share of the pushes between 10 and 40 %; overall: root mean square of the sd over that of the
+    mean.
     """
 
     values: Array
-    quantiles: tuple[float, ...]
     within: Estimate
     overall: Estimate
 
@@ -78,7 +75,7 @@ class Shape:
 
 
 def section(study: Study) -> Section:
-    """The noise of repetitions on every surface, of VHGPs, and of VHGPs of measured sets."""
+    """The noise of repetitions on every surface, and of VHGPs."""
     grid = study.reference_grid
     groups = {
         f"all {len(grid.seen)} pushes": grid.seen,
@@ -100,7 +97,6 @@ def section(study: Study) -> Section:
         (
             _size_table(grid, ratios, ranges, arm),
             _shape_table(study, {**found, "halves of the repetitions": [most] if most else []}),
-            *(table for corpus in study.corpora for table in _learned_table(study, corpus)),
         ),
         (_ratio_picture(study, every), _map_picture(study)),
         NOTES,
@@ -147,7 +143,6 @@ def _ratios(mean: Array, sd: Array, weights: Array) -> Ratios:
     inside = ((values >= LOW) & (values <= HIGH)).astype(np.float64)
     return Ratios(
         values,
-        tuple(np.quantile(values, QUANTILES).tolist()),
         by_blocks(lambda w: w @ inside / w.sum(axis=1), weights),
         by_blocks(lambda w: np.sqrt((w @ sd**2) / (w @ mean**2)), weights),
     )
@@ -214,46 +209,13 @@ def _place(cell: Repetitions) -> Place:
     return cell.fraction, cell.angle
 
 
-def learned_figures(models: Sequence[ModelMap], k: int) -> tuple[Estimate, ...]:
-    """RMS ratio, median ratio, share within 10 to 40 % and range of output k, over the models."""
-    known = [np.isfinite(model.mean[..., k]) for model in models]
-    parts = [(m.mean[at][:, k], m.process_sd[at][:, k]) for m, at in zip(models, known, strict=True)]
-    figures = np.array([_learned(np.abs(mean), sd) for mean, sd in parts])
-    return tuple(over_seeds(column.tolist()) for column in figures.T)
-
-
-def _learned(mean: Array, sd: Array) -> tuple[float, float, float, float]:
-    ratio = sd / mean
-    within = float(np.mean((ratio >= LOW) & (ratio <= HIGH)))
-    return float(np.sqrt(np.mean(sd**2) / np.mean(mean**2))), float(np.median(ratio)), within, span_of(sd)
-
-
-def _learned_table(study: Study, corpus: Corpus) -> list[Table]:
-    """The noise that VHGPs learn from a corpus; none without a square pushed at about 20 mm/s."""
-    models = square_maps(study, corpus)
-    forms = (".0%", ".0%", ".0%", ".1f")
-    rows = [
-        (name, *(Number(e, form) for e, form in zip(learned_figures(models, k), forms, strict=True)))
-        for k, name in enumerate(OUTPUT_NAMES if models else ())
-    ]
-    caption = (
-        f"The process noise learned from {corpus.reference_name}. {corpus.title}. VHGPs of "
-        f"{study.size_of(corpus.sets[corpus.reference])} training windows at 20 mm/s, 61 angles and "
-        f"41 contacts within the training data; mean over {study.plan.seeds} draws of training windows with Student's "
-        "interval. The paper: 10 to 40 %, up to an order of magnitude."
-    )
-    head = ("output", "RMS ratio", "median of sd over |mean|", "within 10 to 40 %")
-    return [Table(caption, (*head, "95th over 5th percentile of the sd"), rows)] if rows else []
-
-
 def _size_table(
     grid: RepeatedGrid, ratios: Mapping[str, Sequence[Ratios]], ranges: Mapping[str, Sequence[Estimate]], arm: float
 ) -> Table:
-    """Quantiles, share within the paper's range, ratio of root mean squares, range of the sd; arm in m."""
+    """Share within the paper's range, ratio of root mean squares, range of the sd; arm in m."""
     rows = [
         (
             f"{name}, {which}",
-            *(f"{q:.0%}" for q in part.quantiles),
             Number(part.within, ".0%"),
             Number(part.overall, ".0%"),
             Number(reach, ".1f") if reach else "–",
@@ -261,14 +223,14 @@ def _size_table(
         for which, parts in ratios.items()
         for name, part, reach in zip(NAMES, parts, (*ranges[which], None), strict=True)
     ]
-    head = ("sd over |mean|", "5 % of pushes below", "25 %", "median", "75 %", "95 %", "within 10 to 40 %", "RMS ratio")
+    head = ("sd over |mean|", "within 10 to 40 %", "RMS ratio", "95th over 5th percentile of the sd")
     caption = (
         f"The noise relative to the mean outcome. Simulated repetitions on {grid.surface}, first window of 0.2 s at "
         f"20 mm/s. Whole motion: rotation times {arm * 1e3:.1f} mm, the square's radius of gyration. RMS ratio: root "
         f"mean square of the sd over that of the mean. {OF_BLOCKS} Last: the range of the sd; its intervals resample "
         "repetitions, and a basic bootstrap of the logarithm removes most of the bias from errors of the sds."
     )
-    return Table(caption, (*head, "95th over 5th percentile of the sd"), rows)
+    return Table(caption, head, rows)
 
 
 def _shape_table(study: Study, found: Mapping[str, Sequence[Shape]]) -> Table:

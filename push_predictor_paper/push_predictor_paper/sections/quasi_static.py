@@ -20,7 +20,6 @@ from push_predictor.types import Array
 from push_predictor_paper.claims import TURN
 from push_predictor_paper.data.time_scaled import (
     TRAVEL,
-    WINDOWS,
     Bracket,
     equal_travel,
     number_of,
@@ -30,7 +29,6 @@ from push_predictor_paper.data.time_scaled import (
 )
 from push_predictor_paper.estimate import fold_weights, of_ends
 from push_predictor_paper.painters.curves import LOOKS, SPEED_TICKS, Line, Panel, paint_curves
-from push_predictor_paper.plan import Plan
 from push_predictor_paper.section import Number, Section, Table, TooFewError, picture, speed_text
 from push_predictor_paper.study import Study
 from push_predictor_paper.verdict import Bound, Evidence, Figure
@@ -105,7 +103,7 @@ def section(study: Study) -> Section:
             "beyond": beyond({speed: d for speed, d in departures.items() if speed > plan.speeds[0]}, error),
             "speed_input": speed_as_input(models),
         },
-        (_bracket_table(models), _speed_table(plan, windows, departures)),
+        (_bracket_table(models),),
         (_picture(study, models, departures, error),),
         NOTES,
     )
@@ -226,21 +224,6 @@ def _bracket_table(models: Brackets) -> Table:
     )
     slow = (f"slow pushes: {MAIN}", f"slow pushes: {SAME_SIZE}")
     return Table(caption, ("training pushes", "n", "equal n", *SERIES, *slow), rows)
-
-
-def _speed_table(plan: Plan, windows: Sequence[PushTable], departures: Mapping[float, Estimate]) -> Table:
-    """By speed: windows found and lost, departure from the slowest."""
-    rows = [
-        (speed_text(speed), len(table), WINDOWS * plan.speed_pushes - len(table), Number(away, ".3f"))
-        for (speed, away), table in zip(departures.items(), windows, strict=True)
-    ]
-    caption = (
-        f"Windows and departure by speed. Simulated: windows of {1e3 * TRAVEL:.0f} mm found in {plan.speed_pushes} "
-        f"pushes, {WINDOWS} each. A window is lost where the slider flies ahead or the tip slides off. Departure from "
-        f"the outcome at {speed_text(plan.speeds[0])}: of as many other pushes repeated at every speed, interval by "
-        "push."
-    )
-    return Table(caption, ("speed", "windows", "lost", "departure"), rows)
 
 
 def _picture(study: Study, models: Brackets, departures: Mapping[float, Estimate], error: float) -> Picture:

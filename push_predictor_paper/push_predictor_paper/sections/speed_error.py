@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -29,6 +29,7 @@ from push_predictor_paper.verdict import Evidence, Figure
 FAST = 0.1  # m/s, from which on a push counts as fast
 SAME_SPEED = 1.12  # ratio of speeds that a reader is told as one
 FEWEST_PUSHES = 8  # at a speed, for an interval
+NO_DRAWS = np.zeros(0)
 NOTES = (
     "The simulator has inertia, and friction that does not depend on speed. Quasi-static prediction therefore fails at "
     "high speed by construction. The speed at which it fails follows from the rig's masses and friction.",
@@ -42,8 +43,8 @@ BySpeed = Mapping[str, Sequence[Estimate]]  # by kind of model, at each speed
 class HeldOut:
     """n held-out windows of all folds, of models with `size` training windows.
 
-    push_id (n,); speed (n,) m/s, the push's; group (n,), number of its speed among `speeds`; travel (n,) m of the
-    pusher; observed (n, 3); predicted by kind (n, 3).
+    push_id (n,); speed (n,) m/s, the push's; group (n,), number of its speed among `speeds`; observed (n, 3); predicted
+    by kind (n, 3).
     """
 
     size: int
@@ -51,7 +52,6 @@ class HeldOut:
     speed: Array
     group: IntArray
     speeds: Array
-    travel: Array
     observed: Array
     predicted: Mapping[str, Array]
 
@@ -61,7 +61,7 @@ class HeldOut:
 
     def take(self, rows: np.ndarray) -> HeldOut:
         """Some of the windows."""
-        columns = {f: getattr(self, f)[rows] for f in ("push_id", "speed", "group", "travel", "observed")}
+        columns = {f: getattr(self, f)[rows] for f in ("push_id", "speed", "group", "observed")}
         return replace(self, **columns, predicted={kind: mean[rows] for kind, mean in self.predicted.items()})
 
     @property
@@ -91,15 +91,14 @@ class HeldOut:
 
 
 def section(study: Study, corpus: Corpus) -> Section:
-    """NMSE within each speed and bias along and across, all kinds of model, whole pushes held out."""
+    """NMSE within each speed, all kinds of model, whole pushes held out."""
     windows = held_out(study, corpus)
     if windows is None or len(windows.speeds) < 2:
         raise TooFewError(f"{corpus.name}: too few windows to train a model, or of one speed only.")
     by_speed = [windows.at(k) for k in range(len(windows.speeds))]
     nmse = {kind: [within_nmse(at, (kind,)) for at in by_speed] for kind in KINDS}
-    found = (nmse, _bias(by_speed, 0), _bias(by_speed, 1))
     evidence = {"unreliable": unreliable(windows), "captured": captured(windows)}
-    return Section(evidence, (_table(corpus, windows, *found),), (_picture(study, corpus, windows, *found),), NOTES)
+    return Section(evidence, (_table(corpus, windows, nmse),), (_picture(study, corpus, windows, nmse),), NOTES)
 
 
 def unreliable(windows: HeldOut) -> Evidence:
@@ -132,8 +131,7 @@ def held_out(study: Study, corpus: Corpus) -> HeldOut | None:
     group = speed_groups(table.push_id, speed)
     speeds = np.array([np.median(speed[group == k]) for k in range(int(group.max()) + 1)])
     predicted = {kind: np.concatenate([score.predicted for score in scores]) for kind, scores in folds.items()}
-    travel = table.inputs[:, 0] * table.duration
-    return HeldOut(sizes[-1], table.push_id, speed, group, speeds, travel, table.outcomes, predicted)
+    return HeldOut(sizes[-1], table.push_id, speed, group, speeds, table.outcomes, predicted)
 
 
 def push_speeds(push_id: np.ndarray, speed: Array) -> Array:
@@ -182,83 +180,46 @@ def spearman(first: Array, second: Array, weights: Array) -> Array:
 
 
 def within_nmse(windows: HeldOut, kinds: Sequence[str]) -> Estimate:
-    """NMSE of a kind, or of the second kind minus the first, over the variance of these windows; interval by push."""
+    """NMSE of a kind, or of the second kind minus the first, over the variance of these windows.
 
-    def figure(sums: list[Array]) -> Array:
-        first, second, total, squares, count = sums
-        return np.asarray(((second - first) / (squares - total**2 / count)).sum(axis=1))
-
-    errors = [windows.error(kind) for kind in kinds]
-    first, second = errors if len(errors) == 2 else (np.zeros_like(errors[0]), errors[0])
-    centred = windows.observed - windows.observed.mean(axis=0)
-    columns = [first, second, centred, centred**2, np.ones((len(centred), 1))]
-    return by_drawn_pushes(windows.push_id, columns, figure)
-
-
-def bias(windows: HeldOut, kind: str, output: int) -> Estimate:
-    """Mean of observed minus predicted as a share of the pusher's travel; interval by push.
-
-    Across (output 1) it counts towards the side to which the slider goes by the analytical model, lest left and
-    right cancel.
+    Interval by push; none for too few pushes.
     """
-    side = np.sign(windows.predicted["analytical"][:, 1]) if output == 1 else 1.0
-    residual = side * (windows.observed[:, output] - windows.predicted[kind][:, output])
-    columns = [residual[:, None], windows.travel[:, None]]
-    return by_drawn_pushes(windows.push_id, columns, lambda sums: (sums[0] / sums[1])[:, 0])
+    errors = [windows.error(kind) for kind in kinds]
+    error = errors[0] if len(errors) == 1 else errors[1] - errors[0]
+    centred = windows.observed - windows.observed.mean(axis=0)
+    pushes, push = np.unique(windows.push_id, return_inverse=True)
+    sums = [by_push(push, column) for column in (error, centred, centred**2, np.ones((len(centred), 1)))]
+
+    def figure(weights: Array) -> Array:
+        off, total, squares, count = (weights @ part for part in sums)
+        return np.asarray((off / (squares - total**2 / count)).sum(axis=1))
+
+    enough = len(pushes) >= FEWEST_PUSHES
+    return of_draws(float(figure(np.ones((1, len(pushes))))[0]), figure(push_bootstrap(pushes)) if enough else NO_DRAWS)
 
 
-def _bias(windows: Sequence[HeldOut], output: int) -> BySpeed:
-    """Bias at each speed, per cent of the pusher's travel."""
-    return {kind: [bias(at, kind, output).times(100.0) for at in windows] for kind in KINDS}
-
-
-def by_drawn_pushes(push_id: np.ndarray, columns: Sequence[Array], figure: Callable[[list[Array]], Array]) -> Estimate:
-    """A figure of sums over windows of columns (n, k), with interval by push; none for too few pushes."""
-    pushes, push = np.unique(push_id, return_inverse=True)
-    sums = [by_push(push, column) for column in columns]
-    value = float(figure([total.sum(axis=0, keepdims=True) for total in sums])[0])
-    if len(pushes) < FEWEST_PUSHES:
-        return Estimate(value, np.nan, np.nan)
-    weights = push_bootstrap(pushes)
-    return of_draws(value, figure([weights @ total for total in sums]))
-
-
-def _table(corpus: Corpus, windows: HeldOut, nmse: BySpeed, along: BySpeed, across: BySpeed) -> Table:
+def _table(corpus: Corpus, windows: HeldOut, nmse: BySpeed) -> Table:
     rows = []
     for k in range(len(windows.speeds)):
         at = windows.at(k)
-        biases = (Number(part["analytical"][k], ".1f") for part in (along, across))
-        rows.append((at.speed_range, at.pushes, len(at.push_id), *(Number(c[k]) for c in nmse.values()), *biases))
+        rows.append((at.speed_range, at.pushes, len(at.push_id), *(Number(of[k]) for of in nmse.values())))
     caption = (
-        f"NMSE (sum of 3) over the variance at each speed, and bias of the analytical model. "
-        f"{corpus.reference_name}, n = {windows.size}, {SPLIT_WORDS['push']}. Pushes: {corpus.name}; "
-        f"neighbouring speeds with fewer than {FEWEST_PUSHES} pushes are joined. Bias: mean of observed minus "
-        "predicted, per cent of the pusher's travel; across: towards the predicted side. Interval by push. The paper "
-        "gives no numbers."
+        f"NMSE (sum of 3) over the variance at each speed. {corpus.reference_name}, n = {windows.size}, "
+        f"{SPLIT_WORDS['push']}. Pushes: {corpus.name}; neighbouring speeds with fewer than {FEWEST_PUSHES} pushes are "
+        "joined. Interval by push. The paper gives no numbers."
     )
-    head = ("speed", "pushes", "windows", *(f"NMSE, {KIND_NAMES[kind]}" for kind in KINDS), "bias along", "bias across")
+    head = ("speed", "pushes", "windows", *(f"NMSE, {KIND_NAMES[kind]}" for kind in KINDS))
     return Table(caption, head, tuple(rows))
 
 
-def _picture(study: Study, corpus: Corpus, windows: HeldOut, nmse: BySpeed, along: BySpeed, across: BySpeed) -> Picture:
+def _picture(study: Study, corpus: Corpus, windows: HeldOut, nmse: BySpeed) -> Picture:
     speeds = (1e3 * windows.speeds).tolist()
     ticks = [tick for tick in SPEED_TICKS if min(speeds) / 1.15 <= tick <= 1.15 * max(speeds)]
-
-    def panel(curves: BySpeed, title: str, label: str) -> Panel:
-        lines = [Line(KIND_NAMES[kind], KIND_LOOKS[kind], speeds, curves[kind]) for kind in KINDS]
-        return Panel(title, "speed (mm/s)", label, lines, ticks, ratio=curves is nmse, zero=curves is not nmse)
-
-    share = "observed − predicted (% of travel)"
-    panels = [
-        panel(nmse, "NMSE within the speed", "NMSE, sum of 3"),
-        panel(along, "bias along the push", share),
-        panel(across, "bias across the push", share),
-    ]
+    lines = [Line(KIND_NAMES[kind], KIND_LOOKS[kind], speeds, nmse[kind]) for kind in KINDS]
     return picture(
         study.file("speed_error", corpus),
-        (8.4, 3.4),
-        partial(paint_curves, rows=[panels], shared=False),
-        "Error of analytical model, GP and VHGP against the pusher's speed. NMSE within each speed, and mean of "
-        "observed minus predicted along and across the push, as a share of the pusher's travel. Bands: 95 % by push. "
-        f"{corpus.reference_name}, pushes: {corpus.name}.",
+        (4.4, 3.4),
+        partial(paint_curves, rows=[[Panel("", "speed (mm/s)", "NMSE, sum of 3", lines, ticks, ratio=True)]]),
+        "Error of analytical model, GP and VHGP against the pusher's speed. NMSE within each speed. Bands: 95 % by "
+        f"push. {corpus.reference_name}, pushes: {corpus.name}.",
     )

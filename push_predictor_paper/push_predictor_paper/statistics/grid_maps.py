@@ -103,13 +103,6 @@ def correlation(one: Array, other: Array, weights: Array) -> Array:
     return np.asarray(np.where(flat, np.nan, covariance / np.where(flat, 1.0, spread)))
 
 
-def relative_error(model: Array, truth: Array, weights: Array) -> Array:
-    """Squared distance of two maps (m,) over the squared deviation of the true one from its mean, (d,)."""
-    total, away = weights.sum(axis=1), truth - truth.mean()
-    spread = weights @ away**2 - (weights @ away) ** 2 / total
-    return np.asarray(weights @ (model - truth) ** 2 / spread)
-
-
 @dataclass(frozen=True)
 class Peak:
     """The largest value of a map and its place; places: where it falls in 95 % of the draws.
