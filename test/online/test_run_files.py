@@ -43,5 +43,7 @@ def test_a_table_that_cannot_be_written_is_a_problem_and_no_error(tmp_path: Path
     table.add(windows, [])
     assert table.failure.startswith("Windows and residuals are no longer saved: ") and str(tmp_path) in table.failure
     (tmp_path / "gone").unlink()
+    (tmp_path / "gone").mkdir()
     table.add(windows, [])
-    assert not (tmp_path / "gone").exists(), "a table with a gap would be no table of the run"
+    table.add_residual("gp", windows[0], np.zeros(3), np.eye(3))
+    assert not list((tmp_path / "gone").iterdir()), "a table with a gap would be no table of the run"
