@@ -28,4 +28,4 @@ def test_a_frame_needs_its_static_transforms_and_a_field_its_topic() -> None:
 def test_a_missing_topic_is_named_as_it_was_given_and_the_wrench_is_optional() -> None:
     assert missing_poses(LAB, Topics("/vicon/block/blok", "/tf:tool0")) == ["/vicon/block/blok"]
     assert missing_poses([topic for topic in LAB if topic != "/netft"], NAMED) == []
-    assert push_topics(["/t", "/t_static"], Topics("/t", "/t")) == {"/t"}
+    assert push_topics(["/t", "/t_static"], Topics("/t", "/u")) == {"/t"}
