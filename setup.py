@@ -117,7 +117,6 @@ setup(
         "report": ["matplotlib>=3.6", "jinja2>=3.1"],
         "live": ["rich>=13"],
         "completion": ["argcomplete>=3"],
-        "parquet": ["pyarrow>=14"],
         "gym": ["gymnasium>=1.1"],
         "import": ["rosbags>=0.10", "h5py>=3.10"],
         "docs": ["mkdocs>=1.6,<2", "mkdocs-material>=9.5,<10", "mkdocstrings[python]>=0.27", "ruff>=0.6"],
@@ -132,7 +131,6 @@ setup(
             "scikit-learn>=1.4",
             "mcap-ros2-support>=0.5",
             "argcomplete>=3",
-            "pyarrow>=14",
         ],
     },
     entry_points={

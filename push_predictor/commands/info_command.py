@@ -39,8 +39,6 @@ BIAS_UNITS = {
 )
 def run(options: argparse.Namespace) -> None:
     """Describe the file and print the description."""
-    from push_predictor.errors import RecordingError
-    from push_predictor.recordings.bag.csv_streams import PARQUET
     from push_predictor.recordings.describe import describe_recording, describe_table
     from push_predictor.recordings.table_file import is_recording
 
@@ -55,8 +53,6 @@ def run(options: argparse.Namespace) -> None:
         reading.save_topics([path])
     elif path.name.endswith((".csv", ".csv.gz")):
         found = describe_table(path)
-    elif path.suffix == ".parquet":
-        raise RecordingError(f"{path}: {PARQUET}")
     else:
         found = _describe_model(path)
     if not write_json(options, found):

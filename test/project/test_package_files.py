@@ -64,13 +64,12 @@ OPTIONAL = {
     "gymnasium",
     "h5py",
     "joblib",
-    "pyarrow",
     "rich",
     "rosbags",
     "threadpoolctl",
 }  # extras, or by pip only
 ONLY_TO_BUILD = {"cython": "cython3"}  # compiled modules import it, and need it no longer when they are compiled
-ONLY_BY_PIP = {"diptest", "gymnasium", "pyarrow"}  # no key of rosdep
+ONLY_BY_PIP = {"diptest", "gymnasium"}  # no key of rosdep
 IMPORTS = re.compile(
     r"^ *(?:from (\w+)[\w.]* import |import (\w+)[\w.]*(?: as \w+)?$)"
     r"|(?:importorskip|import_module)\([\"'](\w+)[\w.]*[\"'][,)]",

@@ -5,19 +5,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
-from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-pytest.importorskip("pyarrow", reason="rosdep has no key of pyarrow: pip install pyarrow")
 pytest.importorskip("rosbags")
-import pyarrow
 from lab_bags import pose_rows
-from pyarrow import parquet
 from test_lab_topics import assert_same_windows, original
 
 from push_predictor.errors import RecordingError
@@ -94,76 +88,3 @@ def test_a_folder_without_both_streams_is_no_recording(tmp_path: Path) -> None:
     (path / "pusher.csv").unlink()
     with pytest.raises(RecordingError, match=r"no \.bag, and not both slider\.csv and pusher\.csv"):
         read_recording(path)
-
-
-def as_parquet(file: Path) -> None:
-    """Replace a CSV file by a Parquet file with the same columns; the time as a decimal."""
-    header, *rows = [line.split(",") for line in file.read_text().splitlines()]
-    columns = dict(zip(header, zip(*rows, strict=True), strict=True))
-    numbers = {name: [float(cell or "nan") for cell in cells] for name, cells in columns.items()}
-    parquet.write_table(
-        pyarrow.table({**numbers, "time": [Decimal(cell) for cell in columns["time"]]}), file.with_suffix(".parquet")
-    )
-    file.unlink()
-
-
-@pytest.fixture
-def without_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An installation without the package."""
-    for name in ("pyarrow", "pyarrow.parquet"):
-        monkeypatch.setitem(sys.modules, name, None)
-
-
-def test_parquet_streams_are_those_of_csv(tmp_path: Path) -> None:
-    path = write(tmp_path / "lab", planar=True)
-    expected = read_recording(path)
-    for name in ("slider", "wrench"):
-        as_parquet(path / f"{name}.csv")
-    found = read_recording(path)
-    assert found.wrench is not None and expected.wrench is not None
-    for one, other in ((found.slider, expected.slider), (found.wrench, expected.wrench)):
-        for key, value in vars(one).items():
-            assert np.array_equal(value, getattr(other, key)), key
-
-
-def test_of_a_stream_with_both_endings_the_csv_file_is_read(tmp_path: Path) -> None:
-    path = write(tmp_path / "lab", planar=True)
-    (path / "slider.parquet").write_bytes(b"PAR1")
-    assert len(read_recording(path).slider) == len(original().slider)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda file: file.write_bytes(b"PAR1"), r"slider\.parquet: cannot be read as Parquet"),
-        (
-            lambda file: parquet.write_table(pyarrow.table({"time": [1.0], "x": [0.0]}), file),
-            r"slider\.parquet line 1: the header is 'time,x', give",
-        ),
-        (
-            lambda file: parquet.write_table(parquet.read_table(file).slice(0, 0), file),
-            r"slider\.parquet: contains no rows",
-        ),
-    ],
-)
-def test_a_parquet_file_that_does_not_fit_is_refused(
-    tmp_path: Path, change: Callable[[Path], object], words: str
-) -> None:
-    path = write(tmp_path / "lab", planar=True)
-    as_parquet(path / "slider.csv")
-    change(path / "slider.parquet")
-    with pytest.raises(RecordingError, match=words):
-        read_recording(path)
-
-
-def test_without_pyarrow_a_stream_is_refused_with_both_remedies(tmp_path: Path, without_pyarrow: None) -> None:
-    path = write(tmp_path / "lab", planar=True)
-    (path / "slider.csv").rename(path / "slider.parquet")
-    with pytest.raises(RecordingError, match=r"slider\.parquet: Parquet files need .*pip install pyarrow.*to_csv"):
-        read_recording(path)
-
-
-def test_without_pyarrow_a_further_parquet_file_is_noted(tmp_path: Path, without_pyarrow: None) -> None:
-    path = write(tmp_path / "lab", planar=True)
-    (path / "heat.parquet").write_bytes(b"PAR1")
-    assert any(note.startswith("heat.parquet is ignored; Parquet files") for note in read_recording(path).notes)

@@ -1,7 +1,7 @@
 # Copyright 2026 The push_predictor authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A folder of CSV or Parquet files, one for each stream, as messages of a recording."""
+"""A folder of CSV files, one for each stream, as messages of a recording."""
 
 from __future__ import annotations
 
@@ -29,17 +29,13 @@ STREAMS = {
     "wrench": ("/pusher/wrench", (SPATIAL, PLANAR)),
 }
 SCALAR = "sensor_msgs/msg/Temperature"  # one number with a header; of another file, its further columns
-PARQUET = (
-    "Parquet files need the package pyarrow (pip install pyarrow); or convert each to CSV: "
-    "python -c \"import pandas; pandas.read_parquet('slider.parquet').to_csv('slider.csv', index=False)\""
-)
 _LATEST = 2**31 * 10**9  # ns; a header has 32 bits of seconds
 
 
 class CsvStreams(BagFile):
     """The streams in slider.csv, pusher.csv, wrench.csv and further files.
 
-    Each may be a Parquet file with the same columns instead. time is in s; x, y, z in m; heading in rad; force in N,
+    time is in s; x, y, z in m; heading in rad; force in N,
     torque in N m. Each further column of another file is a scalar named /FILE/COLUMN. Raises RecordingError that names
     file, line, column, value and what is accepted.
     """
@@ -48,12 +44,7 @@ class CsvStreams(BagFile):
         super().__init__(folder)
         self._messages: dict[str, list[RawMessage]] = {}
         for file in _files(folder):
-            if file.suffix.lower() == ".csv":
-                self._read(read_sheet(file, RecordingError))
-            elif file.stem.lower() in STREAMS or _parquet_is_read():
-                self._read(_parquet_sheet(file))
-            else:
-                self.notes.add(f"{file.name} is ignored; {PARQUET}")
+            self._read(read_sheet(file, RecordingError))
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """See BagFile; in order of time, those of a topic in its file's order."""
@@ -102,35 +93,7 @@ def is_csv_recording(folder: Path) -> bool:
 
 
 def _files(folder: Path) -> list[Path]:
-    """The files of the streams; of one with both endings the CSV file."""
-    files = sorted(folder.iterdir())
-    found = {f.stem: f for ending in (".parquet", ".csv") for f in files if f.suffix.lower() == ending}
-    return [file for _, file in sorted(found.items())]
-
-
-def _parquet_is_read() -> bool:
-    try:
-        import pyarrow.parquet  # noqa: F401 (whether it can be imported is the question)
-    except ImportError:
-        return False
-    return True
-
-
-def _parquet_sheet(file: Path) -> Sheet:
-    """The cells of a Parquet file, with the line numbers that it would have as CSV."""
-    try:
-        from pyarrow import parquet
-    except ImportError:
-        raise RecordingError(f"{file}: {PARQUET}") from None
-    try:
-        table = parquet.read_table(file)
-        columns = [column.to_pylist() for column in table.columns]
-    except Exception as error:  # pyarrow raises its own classes, OSError and ValueError
-        raise RecordingError(f"{file}: cannot be read as Parquet ({' '.join(str(error).split())})") from None
-    if not table.num_rows:
-        raise RecordingError(f"{file}: contains no rows, give one row for each sample")
-    cells = [["" if cell is None else str(cell) for cell in row] for row in zip(*columns, strict=True)]
-    return Sheet(file, table.column_names, cells, range(2, len(cells) + 2), RecordingError)
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() == ".csv")
 
 
 def _refused(sheet: Sheet, accepted: str) -> RecordingError:

@@ -120,7 +120,7 @@ class Bag:
 
 
 def open_bag(path: Path) -> Bag:
-    """Open an MCAP, sqlite3 (.db3) or ROS 1 file, or a folder of them or of CSV or Parquet streams.
+    """Open an MCAP, sqlite3 (.db3) or ROS 1 file, or a folder of them or of CSV streams.
 
     The first bytes of a file decide which it is, and whether it is compressed. Raises RecordingError without such
     files, or if all are empty or foreign; a single such file becomes a note.
