@@ -94,6 +94,7 @@ def paper(options: argparse.Namespace) -> None:
         page, content = report_paper(plan, work, options.out, options.data, keep, watch)
     if not write_json(options, {"report": str(page), **content}):
         print(page)
+        print("claims:", ", ".join(f"{verdict} {count}" for verdict, count in content["verdicts"].items()))
 
 
 @command(

@@ -86,7 +86,7 @@ HOW_TO_READ = (
     "works and that the simulated physics suffices for the effect. It does not show that real pushes behave so.",
 )
 QUICK_WARNING = (
-    "Made with `--quick`: a few small recordings, at most 200 training windows, speeds up to 200 mm/s. Intervals are "
+    "Made with `--quick`: a few small recordings, at most 400 training windows, speeds up to 200 mm/s. Intervals are "
     "wide, and verdicts may differ from those of the paper's full size, which is computed without `--quick`."
 )
 COUNTS = "Number of verdicts. Each claim and its number are in the table below."
@@ -135,6 +135,7 @@ def report_paper(
         "paper": PAPER,
         "plan": vars(plan),
         "made": made,
+        "verdicts": _counts(sections),
         "sections": {key: _section_json(key, section) for key, section in sections.items()},
     }
     (out / "tables").mkdir(exist_ok=True)
@@ -180,10 +181,15 @@ def _section_json(key: str, section: Checked) -> dict[str, Any]:
     }
 
 
+def _counts(sections: Mapping[str, Checked]) -> dict[str, int]:
+    found = Counter(finding.verdict for section in sections.values() for finding in section.findings)
+    return {verdict: found[verdict] for verdict in VERDICTS}
+
+
 def _page(study: Study, sections: Mapping[str, Checked], made: Mapping[str, Any]) -> str:
     plan, quick = study.plan, study.plan.size < ENOUGH
-    found: Counter[str] = Counter(finding.verdict for section in sections.values() for finding in section.findings)
-    bars = [html.Bar("Claims of the paper", {verdict: found[verdict] for verdict in VERDICTS})]
+    found = _counts(sections)
+    bars = [html.Bar("Claims of the paper", found)]
     rows = [
         html.VerdictRow(key, TITLES[key], f.claim, f.number, f.verdict)
         for key, section in sections.items()
