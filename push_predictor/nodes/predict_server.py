@@ -244,8 +244,25 @@ class PredictServer(LifecycleNode):
             self._offer(PredictSliderPose, "predict_slider_pose", self._prediction(pose)),
             self._offer(ListModels, "list_models", self._on_list),
         ]
+        for service in self.services:
+            if service.service_name.endswith("/change_state"):
+                service.callback = self._refusing(service.callback)
         self._loaded: Callable[[], None] = lambda: None
         self._use_loaded = self.create_guard_condition(lambda: self._loaded())
+
+    def _refusing(self, change: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        """The service ~/change_state of rclpy, which lets an impossible transition raise and so end the node."""
+
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return change(request, response)
+            except RuntimeError as error:  # RCLError has no public name
+                asked = request.transition.label or request.transition.id
+                self.get_logger().warning(f"transition: {asked!r} is not accepted in state {self._state!r}: {error}")
+                response.success = False
+                return response
+
+        return answer
 
     def _offer(self, kind: Any, name: str, callback: Any, group: CallbackGroup | None = None) -> Service:
         return self.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)

@@ -320,6 +320,10 @@ def test_only_an_active_node_answers_requests_and_accepts_goals(folder):
         assert server.change(Transition.TRANSITION_CONFIGURE)
         assert server.change(Transition.TRANSITION_ACTIVATE)
         assert server.push().success
+        for impossible in (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_CLEANUP, 99):
+            assert not server.change(impossible) and server.state() == "active"
+            assert f"transition: {impossible} is not accepted in state 'active'" in server.process.text()
+        assert server.push().success
         assert server.change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
         assert server.state() == "finalized" and not accepted()
         assert "goal rejected, the node is finalized" in server.process.text()
