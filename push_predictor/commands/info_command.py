@@ -42,7 +42,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "Describe a recording, push table or model file. Lists what is damaged.",
         "push_predictor info bags/square_abs_test",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="a recording, push table or model file")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="a recording, push table or model file, or default: the shipped model"
+    )
     add_rig(parser)
     parser.add_argument(
         "--rig-out", type=Path, metavar="FILE.yaml", help="write the rig; it is that of the push_rig record"
@@ -57,8 +59,9 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.bag.csv_streams import PARQUET
     from push_predictor.recordings.describe import describe_recording, describe_table
     from push_predictor.recordings.table_file import is_recording
+    from push_predictor.resources import model_path
 
-    path: Path = options.file
+    path: Path = options.file if options.file.exists() else model_path(options.file)
     if not path.exists():
         raise FileNotFoundError(2, "no such file or folder", str(path))
     if options.rig_out is not None:

@@ -45,7 +45,9 @@ def add_command(
 
 def add_model(parser: argparse.ArgumentParser, nargs: str | None = None, *, note: str = "") -> None:
     """Add the argument MODEL. note: what it is, where it may be absent or several may be given."""
-    parser.add_argument("model", type=Path, nargs=nargs, metavar="MODEL", help=f"a model file{note}")
+    parser.add_argument(
+        "model", type=Path, nargs=nargs, metavar="MODEL", help=f"a model file, or default: the shipped one{note}"
+    )
 
 
 def add_data(parser: argparse.ArgumentParser) -> None:
