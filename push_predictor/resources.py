@@ -15,6 +15,11 @@ SHIPPED = "default"  # in place of the path of a model: the one that ships with 
 DEFAULT_MODEL = ("resource", "simulated_square_abs.pushmodel")  # of a simulated rig; used unless another model is given
 
 
+def model_path(model: str | os.PathLike[str]) -> Path:
+    """Path of a model file: that of the shipped model for SHIPPED. Raises PushPredictorError if that is missing."""
+    return share_path(*DEFAULT_MODEL) if os.fspath(model) == SHIPPED else Path(model)
+
+
 def share_path(*parts: str) -> Path:
     """Path of a shipped file, in the checkout or where colcon or pip installed it.
 

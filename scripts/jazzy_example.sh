@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # An ordinary Ubuntu 24.04 with ROS 2 Jazzy, from the folder of this repository: dependencies, build, and a replay
-# validated by the model that ships with the package. The block in README.md is these lines; a test compares them.
+# validated by the model that ships with the package. README.md names it.
 set -e
 . /opt/ros/jazzy/setup.sh
 sudo apt install -y python3-pip python3-rosdep python3-colcon-common-extensions

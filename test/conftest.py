@@ -39,7 +39,7 @@ NEEDS_ROS = re.compile(
     r"^\s*(?:from|import) (?:rclpy|rcl_interfaces|ros_harness|msg_adapters|\w+_msgs\b)", re.MULTILINE
 )
 LONGEST = {  # files that take six seconds of processor time or more, or that wait as long: a third of the workers' time
-    "test_adaptation", "test_alarm", "test_checks", "test_cli", "test_extended_model", "test_gym",
+    "test_adaptation", "test_alarm", "test_blocks", "test_checks", "test_cli", "test_extended_model", "test_gym",
     "test_measured_end_to_end", "test_mpc",
     "test_outline_causes", "test_paper_report", "test_prior_model", "test_tabulated_model",
     "test_trace_verdicts",

@@ -38,6 +38,7 @@ MODELS = {
     "prior": ("prior", TrainingOptions()),
     "gp-plain": ("gp", PLAIN),
     "vhgp-plain": ("vhgp", PLAIN),
+    "gp": ("gp", TrainingOptions()),
     "vhgp-zero": ("vhgp", TrainingOptions(mean="zero")),
     "vhgp-mechanics": ("vhgp", TrainingOptions(mean="mechanics")),
     "vhgp": ("vhgp", TrainingOptions()),

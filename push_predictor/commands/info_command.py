@@ -32,7 +32,9 @@ BIAS_UNITS = {
     "info",
     "Describe a recording, push table or model file. Lists what is damaged.",
     "push_predictor info bags/square_abs_test",
-    Option("file", type=Path, metavar="FILE", help="a recording, push table or model file"),
+    Option(
+        "file", type=Path, metavar="FILE", help="a recording, push table or model file, or default: the shipped model"
+    ),
     RIG,
     Output("--rig-out", type=Path, metavar="FILE.yaml", help="write the rig; it is that of the push_rig record"),
     TOPICS,
@@ -41,8 +43,9 @@ def run(options: argparse.Namespace) -> None:
     """Describe the file and print the description."""
     from push_predictor.recordings.describe import describe_recording, describe_table
     from push_predictor.recordings.table_file import is_recording
+    from push_predictor.resources import model_path
 
-    path: Path = options.file
+    path: Path = options.file if options.file.exists() else model_path(options.file)
     if not path.exists():
         raise FileNotFoundError(2, "no such file or folder", str(path))
     if options.rig_out is not None:

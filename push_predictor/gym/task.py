@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from push_predictor.models.tabulated.tabulated_model import TabulatedModel
 from push_predictor.planning.goal import Goal
 from push_predictor.planning.obstacles.scene import Scene
 from push_predictor.planning.particles import POSE_COVARIATES
-from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
+from push_predictor.resources import SHIPPED
 from push_predictor.types import Array, BoolArray
 
 AnyModel = TabulatedModel | PushModel | str | os.PathLike[str]
@@ -119,7 +118,7 @@ def push_task(
 def _served(model: AnyModel) -> TabulatedModel:
     """The model with its table. Raises RequestError if it needs more than poses."""
     if isinstance(model, (str, os.PathLike)):
-        served = load_served(share_path(*DEFAULT_MODEL) if model == SHIPPED else Path(model))
+        served = load_served(model)
     else:
         served = model if isinstance(model, TabulatedModel) else as_served(model)
     if missing := sorted(set(served.model.needs) - set(POSE_COVARIATES)):

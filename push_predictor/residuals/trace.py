@@ -67,7 +67,7 @@ def trace_data(
     topics: of all recordings. checks: of the data and of what their pushes cover.
     """
     watch("windows", 0.0)
-    model = model if isinstance(model, PushModel) else load_model(Path(model))
+    model = model if isinstance(model, PushModel) else load_model(model)
     data = [Path(path) for path in paths]
     options, inspect = window_options(model), checks or no_inspection
     loaded = load_evidence(data, rig, options, topics=topics, inspect=inspect)

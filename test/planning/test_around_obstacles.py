@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -65,6 +66,18 @@ def test_straight_way_takes_the_fewest_pushes():
     assert labels(plan) == [24] * 4 and plan.probability > 0.99 and plan.risk[-1] == 0.0
     np.testing.assert_allclose(plan.poses[:, 0], [-0.1, -0.05, 0.0, 0.05, 0.1], atol=1e-12)
     assert plan.samples[-1].std(axis=0)[:2] == pytest.approx([0.002, 0.002], rel=0.15)
+
+
+def test_plan_prints_each_push_with_where_it_leads_and_its_risk():
+    plan = plan_around_obstacles(compass(0.001), Scene(SQUARE, TABLE), START, region(-0.04, 0.0))
+    head, push, *more = str(plan).splitlines()
+    assert re.fullmatch(r"Plan: \d pushes, which end in the target with probability [01]\.\d\d", head)
+    contact = (
+        f"contact {plan.pushes.inputs[0, 1]:.3f}, angle +0.00 rad, 20.0 mm/s, for {plan.pushes.windows[0]} windows"
+    )
+    x, y, heading = plan.poses[1]
+    assert push.startswith(f"  1: {contact}; then slider at x {x:.4f} m, y {y:.4f} m, heading {heading:.3f} rad; risk ")
+    assert push.endswith(f" {plan.risk[0]:.3f}") and len(more) == len(plan.pushes) - 1
 
 
 def test_plan_leads_around_an_obstacle():

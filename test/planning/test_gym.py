@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +15,6 @@ pytest.importorskip("gymnasium", reason="rosdep has no key of gymnasium: pip ins
 import gymnasium
 from drifting_models import extended, grain, pushes, slippery
 from gymnasium.utils.env_checker import check_env
-from repository import REPOSITORY
 from synthetic import square_rig
 
 from push_predictor.errors import ModelFileError, RequestError
@@ -89,11 +87,6 @@ def pushed(actions: list[Array], count: int, model: TabulatedModel = SHIPPED) ->
 def test_the_checks_of_gymnasium_pass():
     env = gymnasium.make(ID)  # of the shipped model, about the origin
     check_env(env.unwrapped)
-
-
-def test_the_code_in_the_documentation_runs():
-    page = (REPOSITORY / "docs" / "how_to" / "learn_to_push.md").read_text()
-    exec(re.search(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)[1], {})
 
 
 def test_sliders_of_the_vector_form_move_exactly_as_single_ones_with_their_seeds():

@@ -105,22 +105,23 @@ def node_process(
     namespace: str | None = None,
     params: Mapping[str, Any] | None = None,
     coarse: bool = False,
+    folder: Path = REPOSITORY,
 ) -> Iterator[NodeProcess]:
     """Run `python -m push_predictor.nodes.EXECUTABLE --ros-args ...`; leaving stops it (SIGINT, then kill).
 
     ros_args follow --ros-args as they are, such as "-r", "slider/pose:=/vicon/pose". params: name to value.
-    coarse: with pictures that take a quarter of the time (coarse_node.py).
+    coarse: with pictures that take a quarter of the time (coarse_node.py). folder: where it runs.
     """
     arguments = node_arguments(*ros_args, namespace=namespace, params=params)
     started = [str(COARSE_NODE), executable] if coarse else ["-m", f"push_predictor.nodes.{executable}"]
     command = [sys.executable, *started, "--ros-args", *arguments]
     if executable == "predict_server":
         keep_tables(params)
-    with tempfile.TemporaryDirectory(prefix="push_node_") as folder:
-        log = Path(folder) / "output.txt"
+    with tempfile.TemporaryDirectory(prefix="push_node_") as logs:
+        log = Path(logs) / "output.txt"
         with log.open("wb") as output:
             process = NodeProcess(
-                command, cwd=REPOSITORY, env=node_environment(domain), stdout=output, stderr=subprocess.STDOUT
+                command, cwd=folder, env=node_environment(domain), stdout=output, stderr=subprocess.STDOUT
             )
         process.log = log
         try:

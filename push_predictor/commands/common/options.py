@@ -28,7 +28,9 @@ SIGNED_AXES = ("-x", "-y", "-z")
 
 def model_argument(nargs: str | None = None, note: str = "") -> Option:
     """The argument MODEL. note: what it is, where it may be absent or several may be given."""
-    return Option("model", type=Path, nargs=nargs, metavar="MODEL", help=f"a model file{note}")
+    return Option(
+        "model", type=Path, nargs=nargs, metavar="MODEL", help=f"a model file, or default: the shipped one{note}"
+    )
 
 
 def data_argument(nargs: str = "+", note: str = "") -> Option:

@@ -37,6 +37,7 @@ from push_predictor.models.store.stored import REGRESSIONS
 from push_predictor.recordings.atomic import write_whole
 from push_predictor.recordings.rig import Rig, rig_from_record
 from push_predictor.recordings.table import PushTable
+from push_predictor.resources import model_path
 from push_predictor.types import Array
 
 FORMAT = "push_predictor model"
@@ -71,9 +72,10 @@ def save_model(model: PushModel, path: Path) -> None:
 def load_model(path: str | os.PathLike[str], *, check: bool = True) -> PushModel:
     """Read a model file. Raises ModelFileError if it is absent, damaged, not a model file, or of another version.
 
+    path: of the file, or "default" for the model that ships with the package.
     check: predict some training pushes, which computes the matrices of the regressions.
     """
-    path = Path(path)
+    path = model_path(path)
     record, arrays = read_archive(path)
     if record.get("format") != FORMAT:
         raise ModelFileError(f"{path}: format {record.get('format')!r} is not accepted, give a {FORMAT!r}")

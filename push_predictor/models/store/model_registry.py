@@ -14,7 +14,7 @@ from push_predictor.models.push_model import defaults_in_words, mean_in_words
 from push_predictor.models.store.model_file import is_model_file
 from push_predictor.models.store.table_cache import completed, load_served
 from push_predictor.models.tabulated.tabulated_model import TabulatedModel
-from push_predictor.resources import DEFAULT_MODEL, SHIPPED, share_path
+from push_predictor.resources import model_path
 from push_predictor.types import Array
 
 
@@ -72,7 +72,7 @@ class ModelRegistry:
         `complete`. Raises ModelFileError for a bad file and for a name in use with `replace` false; the registry is
         then unchanged.
         """
-        path = _located(path)
+        path = _located(model_path(path))
         tabulated = load_served(path, at_once=at_once)
         name = name or tabulated.model.name
         if not replace and name in self._models:
@@ -105,14 +105,14 @@ class ModelRegistry:
         return [f"{name}: {tabulated.how}" for name, tabulated in self._models.items()]
 
     def load_all(self, places: Iterable[str], *, at_once: bool = False) -> list[str]:
-        """Load files, folders of files and, for SHIPPED, the shipped model; at_once: see `load`.
+        """Load files, folders of files and, for `default`, the shipped model; at_once: see `load`.
 
         Returns one line for each model that could not be loaded; the others are loaded.
         """
         problems = []
         for index, place in enumerate(places):
             try:
-                files = model_files(share_path(*DEFAULT_MODEL) if place == SHIPPED else _located(Path(place)))
+                files = model_files(_located(model_path(place)))
             except PushPredictorError as error:
                 problems.append(f"models[{index}]: {error}")
                 continue

@@ -40,6 +40,7 @@ from push_predictor.models.tabulated.tabulated_model import (
     with_table,
 )
 from push_predictor.recordings.atomic import write_whole
+from push_predictor.resources import model_path
 from push_predictor.types import Array
 
 FOLDER = "PUSH_PREDICTOR_CACHE"  # environment variable
@@ -57,12 +58,13 @@ MOST_TABLES = 20  # kept; the least recently used ones are deleted
 
 
 @one_blas_thread()
-def load_served(path: Path, *, at_once: bool = False) -> TabulatedModel:
+def load_served(path: str | os.PathLike[str], *, at_once: bool = False) -> TabulatedModel:
     """The model of a file as the server predicts with it, its tables from disk where they are there.
 
     at_once: a model without tables on disk predicts by itself, and states that its table is missing; `completed` adds
     it. Raises ModelFileError as `load_model` does, and if the model cannot predict.
     """
+    path = model_path(path)
     model = load_model(path, check=False)
     try:
         # The model of a kept table was checked before the table was computed.

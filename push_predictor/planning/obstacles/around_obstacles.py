@@ -58,6 +58,16 @@ class PlannedPushes:
     risk: Array
     probability: float
 
+    def __str__(self) -> str:
+        ahead = f"{len(self.pushes)} pushes, which end in the target with probability {self.probability:.2f}"
+        rows = zip(self.pushes.inputs, self.pushes.windows, self.poses[1:], self.risk, strict=True)
+        lines = [
+            f"contact {contact:.3f}, angle {angle:+.2f} rad, {1e3 * velocity:.1f} mm/s, for {windows} windows; "
+            f"then slider at x {x:.4f} m, y {y:.4f} m, heading {heading:.3f} rad; risk until then {risk:.3f}"
+            for (velocity, contact, angle), windows, (x, y, heading), risk in rows
+        ]
+        return "\n".join([f"Plan: {ahead}", *(f"  {count}: {line}" for count, line in enumerate(lines, 1))])
+
 
 def plan_around_obstacles(
     repertoire: Repertoire,
