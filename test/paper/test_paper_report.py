@@ -167,8 +167,9 @@ def test_the_command_computes_the_plan_that_was_asked_for(
 
     def computed(*arguments: object) -> tuple[Path, dict[str, object]]:
         asked.extend(arguments)
-        return tmp_path / "paper.html", {}
+        return tmp_path / "paper.html", {"verdicts": {"holds": 3, "not decided": 1}}
 
     monkeypatch.setattr("push_predictor_paper.report.report_paper", computed)
     assert main(["report", "paper", "--out", str(tmp_path), *options]) == 0
-    assert asked[0] == plan and asked[2] == tmp_path and capsys.readouterr().out.strip().endswith("paper.html")
+    assert asked[0] == plan and asked[2] == tmp_path
+    assert capsys.readouterr().out == f"{tmp_path / 'paper.html'}\nclaims: holds 3, not decided 1\n"
