@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.table_file import is_recording
     from push_predictor.resources import model_path
 
-    path: Path = options.file if options.file.exists() else model_path(options.file)
+    path: Path = model_path(options.file)
     if not path.exists():
         raise FileNotFoundError(2, "no such file or folder", str(path))
     if options.rig_out is not None:

@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 COLUMNS = ("velocity", "contact", "angle", "duration", "variance_left")
 
 
+def _model_or_rig(options: argparse.Namespace) -> str:
+    return "give either MODEL or --rig FILE.yaml" if (options.model is None) == (options.rig is None) else ""
+
+
 @command(
     "suggest",
     "Propose the pushes that a model learns most from. They most reduce what its uncertain mean function costs in "
@@ -82,13 +86,12 @@ COLUMNS = ("velocity", "contact", "angle", "duration", "variance_left")
     out_option("the pushes in order, FILE.csv"),
     RIG,
     TOPICS,
+    wrong_call=_model_or_rig,
 )
 def run(options: argparse.Namespace) -> None:
     """Check the call, choose the pushes, write them and print the first."""
     from push_predictor.design.batch import suggest_pushes
 
-    if (options.model is None) == (options.rig is None):
-        options.call_is_wrong("give either MODEL or --rig FILE.yaml")
     limits, model = _limits(options), _model(options)
     matter = None if options.matter is None else _matter(options, model)
     with progress("suggest") as watch:

@@ -30,6 +30,11 @@ LEARNT = ("vhgp", "gp")
 KINDS = ("vhgp", "gp", "analytical", "prior")
 
 
+def _without_data(options: argparse.Namespace) -> str:
+    missing = not options.data and options.kind != "prior"
+    return "the following arguments are required: DATA (only --kind prior needs none)" if missing else ""
+
+
 @command(
     "train",
     "Train a model from recordings or push tables and save it. vhgp learns mean and noise of the outcome, gp the "
@@ -66,6 +71,7 @@ KINDS = ("vhgp", "gp", "analytical", "prior")
     Option("--name", help="name: of the model in the services (default: the name of the file)"),
     out_option("the model, FILE.pushmodel"),
     *READING,
+    wrong_call=_without_data,
 )
 def run(options: argparse.Namespace) -> None:
     """Check the call, load the data, train the model and save it."""
@@ -76,8 +82,6 @@ def run(options: argparse.Namespace) -> None:
     from push_predictor.recordings.windows.push_window import WindowOptions
 
     kind = options.kind
-    if not options.data and kind != "prior":
-        options.call_is_wrong("the following arguments are required: DATA (only --kind prior needs none)")
     _check(options, kind)
     reading = Reading(options)
     rig, checks = reading.rig or load_rig_for(options.data), reading.checks

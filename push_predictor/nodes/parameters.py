@@ -75,8 +75,8 @@ def declare(node: Node, params: Sequence[Param]) -> None:
     table = {param.name: param for param in params}
     for name in getattr(node, "_parameter_overrides", {}):  # rclpy has no public name for them
         if name not in table and not node.has_parameter(name) and not name.startswith("qos_overrides."):
-            (nearest,) = get_close_matches(name, table, 1, cutoff=0.0)
-            node.get_logger().warning(f"parameter {name!r} is unknown and ignored; the nearest name is {nearest!r}")
+            nearest = [f"; the nearest name is {near!r}" for near in get_close_matches(name, table, 1, cutoff=0.5)]
+            node.get_logger().warning(f"parameter {name!r} is unknown and ignored{''.join(nearest)}")
     for param in params:
         given = given_value(node, param.name)
         if given is not None and not param.allows(given):

@@ -139,7 +139,7 @@ def attempt(work: Callable[..., None], pipe: Connection, *arguments: Any) -> Non
     """Do the work of a child; an expected error becomes a message."""
     try:
         work(pipe, *arguments)
-    except (PushPredictorError, OSError) as error:
+    except (PushPredictorError, OSError, EOFError) as error:
         pipe.send(Failure(" ".join(str(error).split()), error_code(error)))
 
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Collection, Hashable, Mapping
 
 
 class News:
@@ -18,6 +18,10 @@ class News:
         self._at_once = at_once
         self._seen: Mapping[str, Hashable] = {}
         self._told: dict[str, Hashable] = {}
+
+    def gone(self, present: Collection[str]) -> list[str]:
+        """The keys that were news and are no longer present."""
+        return [key for key in self._told if key not in present]
 
     def of(self, present: Mapping[str, Hashable]) -> list[str]:
         """The keys of the news; a value tells in what state a thing is."""

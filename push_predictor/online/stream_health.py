@@ -23,6 +23,7 @@ from push_predictor.recordings.windows.stream_faults import CLOCK_TOLERANCE, des
 from push_predictor.types import IntArray
 
 SAME_CLOCK = 10.0  # s; a greater latency means that the stamps are of another clock
+SILENT = 2.0  # s without a sample after which a stream is called silent
 PATIENCE = 5.0  # s of waiting for a stream that lags behind
 # ns; the finder proceeds without a stream that lags by twice as much
 SENSOR_LAG, SCALAR_LAG = 0.5e9 * LONGEST_LAG, 0.5 * LONGEST_GAP
@@ -88,6 +89,7 @@ class StreamSync:
         self._sensors: dict[str, int] = {}  # newest stamp (ns)
         self._scalars: dict[str, int | None] = dict.fromkeys(scalars)
         self._together = dict.fromkeys(scalars, monotonic())
+        self._heard: dict[str, float] = {}  # when a sensor's last sample came
         self._lags: dict[str, deque[float]] = {}  # s, of the other sensors' stamps from the slider's
 
     def note(self, samples: Samples) -> None:
@@ -95,6 +97,7 @@ class StreamSync:
         stamps = {"slider": samples.slider.stamp, "pusher": samples.pusher.stamp, "wrench": samples.wrench.stamp}
         newest = {name: int(stamp[-1]) for name, stamp in stamps.items() if len(stamp)}
         self._sensors |= newest
+        self._heard |= dict.fromkeys(newest, monotonic())
         for name in newest.keys() - {"slider"}:
             if "slider" in self._sensors:
                 lag = 1e-9 * (newest[name] - self._sensors["slider"])
@@ -110,9 +113,21 @@ class StreamSync:
         return all(ok or now - self._together.setdefault(name, now) > PATIENCE for name, ok in near.items())
 
     def apart(self) -> dict[str, float]:
-        """By how much (s) the stamps of a stream stay ahead of (or behind) the slider's, for those that do."""
-        nearest = {name: min(lags, key=abs) for name, lags in self._lags.items() if len(lags) == LAGS}
+        """By how much (s) the stamps of a stream stay ahead of (or behind) the slider's, for those that do.
+
+        Of a stream that has stopped they tell nothing.
+        """
+        stopped = {*self.silent()}
+        compared = (
+            {} if "slider" in stopped else {name: lags for name, lags in self._lags.items() if name not in stopped}
+        )
+        nearest = {name: min(lags, key=abs) for name, lags in compared.items() if len(lags) == LAGS}
         return {name: lag for name, lag in nearest.items() if abs(lag) > CLOCK_TOLERANCE}
+
+    def silent(self) -> list[str]:
+        """The sensors that have stopped while others continue."""
+        newest = max(self._heard.values(), default=0.0)
+        return [name for name, heard in self._heard.items() if newest - heard > SILENT]
 
     @property
     def with_wrench(self) -> bool:
@@ -121,4 +136,8 @@ class StreamSync:
 
     def problems(self) -> list[str]:
         """What keeps windows from being found, in words."""
-        return [describe_clock_offset(name, lag) for name, lag in self.apart().items()]
+        found = [describe_clock_offset(name, lag) for name, lag in self.apart().items()]
+        return found + [
+            f"No sample from the {name} for {SILENT:g} s, others continue: no window can be found."
+            for name in self.silent()
+        ]

@@ -22,7 +22,6 @@ from push_predictor.recordings.rig import HOW_TO_GIVE
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from push_predictor.models.push_model import PushModel
     from push_predictor.residuals.outcome import Trace
 
 REPORT, VERDICT, EXTENDED = "trace.html", "trace.json", "extended.pushmodel"
@@ -33,10 +32,10 @@ NOT_TRACED = ("residuals",)  # a validator's bag of push_residual contains no se
 
 @dataclass(frozen=True)
 class TraceTask:
-    """The pushes to trace, the model or its file, covariates (empty: all), the level alpha and the work folder."""
+    """The pushes to trace, the model file, covariates (empty: all), the level alpha and the work folder."""
 
     evidence: tuple[Path, ...]
-    model: PushModel | Path
+    model: Path
     covariates: tuple[str, ...]
     alpha: float
     folder: Path

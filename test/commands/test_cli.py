@@ -487,3 +487,19 @@ def test_closed_pipe_is_not_an_error(place: Place):
     command = f"'{sys.executable}' -m push_predictor.cli info '{place.path('train')}' | head -c 1"
     done = subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=REPOSITORY, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (["train", "--kind", "gp"], "DATA (only --kind prior needs none)"),
+        (["suggest"], "give either MODEL or --rig FILE.yaml"),
+    ],
+)
+def test_options_that_do_not_belong_together_are_a_wrong_call_whatever_their_values(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], call: list[str], words: str
+) -> None:
+    (tmp_path / "old").write_text("")
+    with pytest.raises(SystemExit) as ended:
+        main([*call, "--out", str(tmp_path / "old")])
+    assert ended.value.code == 2 and words in capsys.readouterr().err

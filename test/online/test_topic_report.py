@@ -10,9 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic import translating_push
 
+from push_predictor.online import stream_health
 from push_predictor.online.news import News
-from push_predictor.online.stream_health import TopicReport, stamp_figures
+from push_predictor.online.stream_health import StreamSync, TopicReport, stamp_figures
+from push_predictor.recordings.decoder.decoder import Samples
+from push_predictor.recordings.streams import taken
 
 SECOND = 1_000_000_000
 REPORT = TopicReport("slider", "/vicon/block", "geometry_msgs/msg/PoseStamped", "best effort", ("world",))
@@ -82,3 +86,32 @@ def test_a_change_that_stays_is_news_once() -> None:
         assert told(other, other, other) == [[], ["slider"], []]
     at_once = News(at_once=True)
     assert [at_once.of(dict.fromkeys(present, "")) for present in ("a", "ab", "", "a")] == [["a"], ["b"], [], ["a"]]
+    assert at_once.gone("a") == [] and at_once.gone("b") == ["a"]
+
+
+# --- streams in step ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("stopped", ["slider", "pusher"])
+def test_a_sensor_that_stops_is_named_and_its_stamps_are_not_taken_for_another_clock(
+    monkeypatch: pytest.MonkeyPatch, stopped: str
+) -> None:
+    """Whatever it comes from: a topic, or a frame of a /tf on which other frames continue."""
+    sync, recording = StreamSync(), translating_push()
+    none = taken(recording.wrench, slice(0, 0))
+
+    def play(begin: int, end: int, *names: str) -> None:
+        for tick in range(begin, end):  # of 0.1 s
+            monkeypatch.setattr(stream_health, "monotonic", lambda tick=tick: 0.1 * tick)
+            at = {name: replace(taken(recording.slider, slice(0, 1)), stamp=np.array([10**8 * tick])) for name in names}
+            gone = taken(recording.slider, slice(0, 0))
+            sync.note(Samples(at.get("slider", gone), at.get("pusher", gone), none))
+
+    play(0, 60, "slider", "pusher")
+    assert sync.problems() == []
+    (other,) = {"slider", "pusher"} - {stopped}
+    play(60, 79, other)
+    assert sync.problems() == []
+    play(79, 200, other)
+    assert sync.problems() == [f"No sample from the {stopped} for 2 s, others continue: no window can be found."]
+    assert sync.apart() == {}

@@ -88,3 +88,9 @@ def test_a_folder_without_both_streams_is_no_recording(tmp_path: Path) -> None:
     (path / "pusher.csv").unlink()
     with pytest.raises(RecordingError, match=r"no \.bag, and not both slider\.csv and pusher\.csv"):
         read_recording(path)
+
+
+def test_a_parquet_file_is_noted(tmp_path: Path) -> None:
+    path = write(tmp_path / "lab", planar=True)
+    (path / "heat.parquet").write_bytes(b"PAR1")
+    assert "heat.parquet is ignored, convert it to CSV" in read_recording(path).notes

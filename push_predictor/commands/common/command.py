@@ -77,12 +77,17 @@ COMMON = (
 
 @dataclass(frozen=True)
 class Command:
-    """A command. The first sentence of its summary is its line in the overview. work: called with checked options."""
+    """A command. The first sentence of its summary is its line in the overview.
+
+    wrong_call: why options do not belong together, '' if they do; asked before values are checked. work: called with
+    checked options.
+    """
 
     name: str
     summary: str
     example: str
     options: tuple[Option | Group, ...]
+    wrong_call: Callable[[argparse.Namespace], str]
     work: Check
 
     def add_to(self, commands: Commands) -> None:
@@ -97,15 +102,23 @@ class Command:
         )
         for option in (*COMMON, *self.options):
             option.add_to(parser)
-        parser.set_defaults(run=self._run, call_is_wrong=parser.error)
+        parser.set_defaults(run=self._run, _refuse=parser.error)
 
     def _run(self, options: argparse.Namespace) -> None:
         """Check the options, outputs first, and do the work. Raises PushPredictorError or OSError."""
+        if wrong := self.wrong_call(options):
+            options._refuse(wrong)
         for option in sorted((*COMMON, *self.options), key=lambda each: not isinstance(each, Output)):
             option.check(options)
         self.work(options)
 
 
-def command(name: str, summary: str, example: str, *options: Option | Group) -> Callable[[Check], Command]:
+def command(
+    name: str,
+    summary: str,
+    example: str,
+    *options: Option | Group,
+    wrong_call: Callable[[argparse.Namespace], str] = lambda options: "",
+) -> Callable[[Check], Command]:
     """Make a function the work of a command with --json, --force and these options."""
-    return lambda work: Command(name, summary, example, options, work)
+    return lambda work: Command(name, summary, example, options, wrong_call, work)

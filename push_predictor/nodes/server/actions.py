@@ -24,6 +24,7 @@ from msg_adapters.predictions import refuse
 from push_predictor.error_codes import ErrorCode
 from push_predictor.errors import BusyError, InactiveError, PushPredictorError, RecordingError, RequestError
 from push_predictor.models.push_model import PushModel
+from push_predictor.models.store.model_file import save_model
 from push_predictor.nodes.runtime import refusal
 from push_predictor.online.child_process import Child, Failure
 from push_predictor.online.trace_process import (
@@ -163,7 +164,9 @@ class TraceAction(GuardedAction):
         with tempfile.TemporaryDirectory(prefix=".trace-", dir=output, ignore_cleanup_errors=True) as work:
             folder = Path(work)
             self._log.info(f"tracing {model.name} on {', '.join(map(str, evidence))}")
-            task = TraceTask(evidence, model, tuple(request.covariates), self._alpha(), folder)
+            deployed = folder / "deployed.pushmodel"
+            save_model(model, deployed)  # pickled, a model has all its matrices, and changes while it predicts
+            task = TraceTask(evidence, deployed, tuple(request.covariates), self._alpha(), folder)
             ended = _watched(goal, check, task)
             if isinstance(ended, Failure):
                 reason = for_client(ended.reason, task)

@@ -80,7 +80,8 @@ class TopicStream:
     def _problem(self, frames: Sequence[str]) -> str:
         own = self.subscription
         if not own.offered:
-            return "" if self._stream == "wrench" else "No publisher."
+            kept = not self._is_sensor and self.own.received  # a scalar that was sent once is valid until the next
+            return "" if self._stream == "wrench" or kept else "No publisher."
         if own.problem:
             return own.problem
         offered = [each.qos_profile.reliability for each in own.offered if each.topic_type == own.kind]

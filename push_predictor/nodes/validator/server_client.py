@@ -26,6 +26,7 @@ from push_predictor_interfaces.srv import ListModels, PredictPush
 PATIENCE = 5.0  # s after which an unanswered request of list_models is sent again
 IN_FLIGHT = 8  # a service queue of the default depth has ten places
 DEPTH = 1000  # a client receives the answers to all clients, which would crowd its own out of a short queue
+QUIET = 10.0  # s without an overdue request after which a server counts as answering again
 PAUSE = 1.0  # s after which a request is repeated that the server could not answer, or not for all models
 NOT_NOW = (ErrorCode.NOT_ACTIVE, ErrorCode.UNKNOWN_MODEL)  # refusals because of the server's state, not of the push
 Answer: TypeAlias = Callable[[PredictPush.Response], None]
@@ -129,7 +130,7 @@ class PredictionClient:
         self._waiting: dict[str, deque[_Pending]] = {}
         self._blocked: dict[str, tuple[float, str]] = {}  # by model: until when, and why
         self._sent: list[_Pending] = []
-        self._silent = False  # whether a request became overdue since the last answer
+        self._overdue = -QUIET  # when a request was last overdue
         self.timeouts = 0
 
     @property
@@ -145,7 +146,11 @@ class PredictionClient:
     @property
     def problems(self) -> list[str]:
         """In words, that the server does not answer, and why it refuses some models."""
-        silent = [f"no answer within {self._timeout:g} s, requests are sent again"] if self._silent else []
+        silent = (
+            [f"no answer within {self._timeout:g} s, requests are sent again"]
+            if monotonic() - self._overdue < QUIET
+            else []
+        )
         return [f"predict_push: {reason}" for reason in [*silent, *(reason for _, reason in self._blocked.values())]]
 
     def ask(self, request: PredictPush.Request, on_answer: Answer) -> None:
@@ -159,7 +164,7 @@ class PredictionClient:
         now = monotonic()
         for pending in self._sent:
             if pending.deadline < now:
-                self._silent = True
+                self._overdue = now
                 self.timeouts += 1
                 self._send(pending, now)
         while len(self._sent) < IN_FLIGHT and (queue := self._next_queue(now)) is not None:
@@ -173,7 +178,7 @@ class PredictionClient:
         self._sent.clear()
         self._waiting.clear()
         self._blocked.clear()
-        self._silent = False
+        self._overdue = -QUIET
 
     def _next_queue(self, now: float) -> deque[_Pending] | None:
         """The longest queue of the models whose requests may be sent now."""
@@ -191,7 +196,6 @@ class PredictionClient:
             return
         self._sent.remove(pending)
         self._abandon(pending)
-        self._silent = False
         response, model = future.result(), pending.request.model
         if not response.success and response.error_code in NOT_NOW:
             self._blocked[model] = (monotonic() + PAUSE, response.message)

@@ -44,14 +44,17 @@ class StatusPublisher:
         self._node, self._session, self._writer = node, session, writer
         self._models, self._rigs, self._sensors, self._client = models, rigs, sensors, client
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._news, self._topic_news = News(at_once=True), News()
+        self._news, self._refusals, self._topic_news = News(at_once=True), News(at_once=True), News()
 
     def publish(self, run: ValidationRun | None) -> None:
         """Publish the status of this moment. run: the present one or the last."""
         self._log_topics()
         problems = self._problems(run)
+        log = self._node.get_logger()
+        for gone in self._news.gone(problems):
+            log.info(f"no longer: {gone}")
         for problem in self._news.of(dict.fromkeys(problems, "")):
-            self._node.get_logger().warning(problem)
+            log.warning(problem)
         status = self._status(run, problems)
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
@@ -63,7 +66,10 @@ class StatusPublisher:
         """Log a line for each topic of which something has changed."""
         log = self._node.get_logger()
         reports = {report.stream: report for report in self._sensors.inspect()}
-        for stream in self._topic_news.of({stream: report.key for stream, report in reports.items()}):
+        keys = {stream: report.key for stream, report in reports.items()}
+        refused = {stream: key for stream, key in keys.items() if reports[stream].refused}
+        others = {stream: key for stream, key in keys.items() if stream not in refused}
+        for stream in [*self._refusals.of(refused), *self._topic_news.of(others)]:
             report = reports[stream]
             if report.refused:  # one line each: rclpy binds the severity to the place of the call
                 log.error(report.line)

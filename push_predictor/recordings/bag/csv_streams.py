@@ -45,6 +45,8 @@ class CsvStreams(BagFile):
         self._messages: dict[str, list[RawMessage]] = {}
         for file in _files(folder):
             self._read(read_sheet(file, RecordingError))
+        for file in sorted(folder.glob("*.parquet")):
+            self.notes.add(f"{file.name} is ignored, convert it to CSV")
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RawMessage]:
         """See BagFile; in order of time, those of a topic in its file's order."""
