@@ -11,6 +11,7 @@ traced, and the extended model is loaded (examples/loop.py).
 
 from __future__ import annotations
 
+import argparse
 import json
 import multiprocessing
 import os
@@ -60,10 +61,14 @@ def main(arguments: Sequence[str] = ()) -> int:
 
     arguments: none, or the seed of the hidden change.
     """
+    parser = argparse.ArgumentParser(
+        prog="python -m examples.demo", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("seed", type=int, nargs="?", default=SEED, help="of the hidden change (default %(default)s)")
+    seed = parser.parse_args(arguments).seed
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     OUT.mkdir(parents=True, exist_ok=True)
-    seed = int(arguments[0]) if arguments else SEED
     print(CONTENTS, flush=True)
     stages = Stages(SHARES)
     # What no node waits for is computed while a core is idle.

@@ -11,6 +11,7 @@ and draws six windows of different kinds. The picture is no screenshot of RViz.
 
 from __future__ import annotations
 
+import argparse
 import os
 import subprocess
 import sys
@@ -85,11 +86,20 @@ Heard = TypeVar("Heard", bound=Listener)
 
 def main(arguments: Sequence[str] = ()) -> int:
     """Record the markers of a replay and draw six of them."""
-    picture, model = (Path(text) for text in (*arguments, *map(str, (PICTURE, MODEL)[len(arguments) :])))
-    received = record_replay(model, Listener)
+    parser = argparse.ArgumentParser(
+        prog="python -m examples.draw_markers",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("picture", type=Path, nargs="?", default=PICTURE, help="where to write (default %(default)s)")
+    parser.add_argument(
+        "model", type=Path, nargs="?", default=MODEL, help="trained if it does not exist (default %(default)s)"
+    )
+    options = parser.parse_args(arguments)
+    received = record_replay(options.model, Listener)
     chosen = choose(received, load_rig_for([HELD_OUT]).outline)
-    draw_windows(picture, chosen)
-    print(picture)
+    draw_windows(options.picture, chosen)
+    print(options.picture)
     return 0
 
 

@@ -59,7 +59,7 @@ class Prediction:
         return self.mean - half, self.mean + half
 
     def __repr__(self) -> str:
-        head = f"Prediction of {len(self)} pushes, mean ± standard deviation"
+        head = f"Prediction of {len(self)} {'push' if len(self) == 1 else 'pushes'}, mean ± standard deviation"
         columns = f"{'dx [mm]':>18}{'dy [mm]':>18}{'dtheta [mrad]':>18}  in domain"
         rows = zip(self.mean[:ROWS_SHOWN], self.std[:ROWS_SHOWN], self.in_domain[:ROWS_SHOWN], strict=True)
         lines = [f"{_cells(mean, std)}  {'yes' if inside else 'NO'}" for mean, std, inside in rows]

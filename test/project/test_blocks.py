@@ -72,7 +72,7 @@ def rig() -> None:
 
 
 def shipped() -> None:
-    shutil.copy(model_path("default"), "square_abs.pushmodel")
+    shutil.copy(model_path("default"), "monday.pushmodel")
 
 
 def changed() -> None:
