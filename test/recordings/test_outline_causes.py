@@ -114,7 +114,11 @@ AXES: Mapping[str, tuple[list[list[float]], float, float]] = {  # {name: (axes, 
 
 @pytest.mark.parametrize(
     ("name", "mistake"),
-    [(HEXAGON, "frame_mirrored_x"), (ROUND, "axes_exchanged"), (SQUARE, "x_mirrored"), (SQUARE, "xy_exchanged")],
+    [
+        *((name, "frame_mirrored_x") for name in (ROUND, HEXAGON)),
+        (ROUND, "axes_exchanged"),
+        *((SQUARE, mistake) for mistake in ("x_mirrored", "xy_exchanged")),
+    ],
 )
 def test_mirrored_or_exchanged_axes_are_named(name: str, mistake: str) -> None:
     axes, sign, offset = AXES[mistake]
