@@ -20,6 +20,7 @@ from push_predictor.recordings.rig import Rig, load_rig
 ROUND_BAG = str(REPOSITORY / "bags" / "circle_pu")
 EXCHANGED = ["--slider-topic", "pusher/pose", "--pusher-topic", "slider/pose"]
 MEASURED = ["--tip-radius", "0.00475", "--surface", "plywood", "--mass", "0.8"]
+CENTRE = ["--support-point", "0", "0", "0.5"]
 
 
 def made(tmp_path: Path, *arguments: str) -> Rig:
@@ -159,7 +160,7 @@ def test_a_polygon_that_is_round_is_noted(tmp_path: Path, capsys: pytest.Capture
         (["--square", "0.09", "--mass", "-1"], "--mass: -1.0"),
         (["--square", "0.09", "--surface", " "], "--surface: ' '"),
         (["--square", "0.09", "--contact-friction", "0"], "--contact-friction: 0.0"),
-        (["--square", "0.09", "--support-point", "30", "0", "1"], "--support-point: [30.0, 0.0]"),
+        (["--square", "0.09", *CENTRE, "--support-point", "30", "0", "0.5"], "--support-point: [30.0, 0.0]"),
         (["--square", "0.09", "--support-point", "0.03", "0", "0.9"], "sum 1, not 0.9"),
         (["--square", "0.09", "--keep-origin"], "--keep-origin"),
         (["--square", "0.09", "--picture", "rig.png"], "ends with .svg"),

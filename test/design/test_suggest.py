@@ -131,7 +131,8 @@ class TestCandidates:
         found = courses(untrained, inputs, 0.03)
         assert found.kept.sum(axis=1).tolist() == [7, 3, 1]
         np.testing.assert_array_equal(found.windows.inputs.reshape(3, 7, 3)[2], np.tile(inputs[2], (7, 1)))
-        np.testing.assert_allclose(found.distance[1, 0], 0.01 * np.arange(7))
+        between = np.abs(np.subtract.outer(np.arange(7), np.arange(7)))
+        np.testing.assert_allclose(found.distance[1], 0.01 * between)
 
     def test_end_where_the_tip_leaves_the_slider(self, untrained: PushModel) -> None:
         found = courses(untrained, np.array([[0.05, 0.01, 1.35]]), 0.1)

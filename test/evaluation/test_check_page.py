@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,8 @@ def test_the_answer_begins_with_the_mistake_and_what_to_do(turned: CheckedData) 
     assert label == "check first"
     assert sentences[0].startswith("2 mistakes are probable. The slider is turned by \N{MINUS SIGN}5.0 degrees")
     assert sentences[1].startswith("Turn the outline")
+    alone = replace(turned, findings=[next(each for each in turned.findings if each.severity == "warning")])
+    assert answer_of(alone)[0][0].startswith("A mistake is probable.")
 
 
 def test_refused_data_cannot_be_used(refused: CheckedData) -> None:

@@ -179,6 +179,7 @@ def test_rejects_parameters_out_of_range_at_start(name: str, context: Context) -
         with plain_node(context, {param.name: value}) as node, pytest.raises(RequestError) as caught:
             declare(node, TABLES[name])
         assert str(caught.value) == f"{param.name}: {value!r} is not accepted, give {param.accepted}"
+        assert all(param.allows(type(param.default)(each)) for each in (param.low, param.high) if each is not None)
 
 
 @pytest.mark.parametrize("name", TABLES)

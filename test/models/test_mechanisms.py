@@ -156,6 +156,14 @@ def test_an_effect_without_a_mechanism_adds_to_the_others() -> None:
         np.testing.assert_allclose(together, expected, rtol=1e-9, atol=1e-12)
 
 
+def test_the_lever_of_an_effect_without_a_mechanism_is_about_the_centre_of_friction() -> None:
+    on, lever = square(centre=(0.01, -0.005)), effect(None, 0.0, 1.0, *[0.0] * 16)
+    contact = float(on.outline.project(np.array([[1.0, -0.005]])).contact[0])
+    push = Push(np.array([[0.05, contact, 0.3], [0.05, contact + 0.01, 0.3]]), np.full(2, 0.2), {})
+    through, beside = joint_shift(on, [lever], push)[:, 0]
+    assert abs(through) < 1e-9 < 1e-4 < abs(beside)
+
+
 def test_an_effect_follows_its_covariate() -> None:
     push, on = some(60), square()
     later = effect("contact_friction", 0.5, basis=DriverBasis("step", ("elapsed_time",), place=500.0))

@@ -304,6 +304,7 @@ DAMAGES: list[tuple[str, Change, str]] = [
     ("gp", put("correlation.shrinkage", -1.0), r"correlation\.shrinkage: numbers from"),
     ("gp", put("correlation.rows", [0, 40]), "IndexError: index 40 is out of bounds"),
     ("gp", put("correlation.rows", [0, 1]), "ValueError: matmul"),
+    ("gp", put("correlation.rows", [0, -1]), "rows: a number of a training row is negative"),
     ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": -np.ones(40)}), r"site_precisions: numbers from"),
     ("vhgp", lambda _, a: a.update({f"{REGRESSION}.site_precisions": np.ones(39)}), "ValueError: matmul"),
     ("sparse vhgp", put("regressions.0.parameters.log_lengthscales", [0.0]), r"log_lengthscales: shape \(1,\)"),

@@ -61,6 +61,13 @@ def test_gradient_of_every_parameter_equals_finite_differences(n: int, every: in
         assert gradient[i] == pytest.approx(expected, abs=1e-8 * np.abs(gradient).max())
 
 
+def test_a_bound_that_is_not_finite_is_refused() -> None:
+    inputs, outputs = rows(20)
+    problem = VhgpProblem.of(inputs, outputs, PARAMETERS)
+    with pytest.raises(FloatingPointError, match="not finite"), np.errstate(all="ignore"):
+        Bound.at(problem, Sites(np.ones(20), np.full(20, -1e200)))
+
+
 def log_normal(at: Array, covariance: Array) -> Array:
     """Log densities (n,) of Gaussians with mean zero and covariances (n, 2, 2) or (1, 2, 2)."""
     at = np.broadcast_to(at, (max(len(covariance), np.size(at) // 2), 2))

@@ -150,7 +150,7 @@ def test_commands_that_cannot_be_done_are_refused_by_name(rig: Rig, tmp_path: Pa
     assert "command: 'go' is not accepted, give one of start" in rig.command("go").message
     assert "model: 'blind' is not accepted, give a model about mechanics" in rig.command("start", "blind").message
     assert rig.command("start", "nobody").error_code == AdaptModel.Response.UNKNOWN_MODEL
-    assert "path: '' is not accepted" in rig.command("save").message
+    assert "path: '' is not accepted, give the path of a model file" in rig.command("save").message
     assert "path: " in rig.command("save", path=str(tmp_path)).message
     assert rig.command("stop").success  # what followed before still does
 

@@ -156,6 +156,13 @@ def test_push_without_a_gain_is_not_added():
     assert labels(plan) == [0] and plan.probability < 0.6
 
 
+def test_of_two_sure_pushes_the_one_that_ends_nearest_to_the_middle_is_taken():
+    """Near is relative to the longest push and to the widest turn."""
+    pushes = made_up([[0.05, 0.004, 0.0], [0.05, 0.0, 0.05], [0.05, 0.0, 0.1]], [0.0, 0.0, 0.0])
+    target = PoseTarget(Goal(np.array([0.05, 0.0, 0.0]), 0.01, 0.08))
+    assert labels(plan_around_obstacles(pushes, Scene(SQUARE, TABLE), np.zeros(3), target)) == [0]
+
+
 def test_slider_that_has_touched_stays_failed():
     scene = Scene(SQUARE, TABLE, [box(0.0, 0.02, -0.2, 0.2)])
     through, onward = np.array([0.2, 0.0, 0.0]), np.array([0.02, 0.0, 0.0])

@@ -187,12 +187,13 @@ def test_noise_accumulates_with_the_persistent_fraction(persistent_fraction, pow
     np.testing.assert_allclose(does.covariance[:, 1, 1], [1e-8, 4.0**power * 1e-8], rtol=1e-6)
 
 
-def test_contact_with_the_tip_removes_noise_along_the_normal():
+@pytest.mark.parametrize(("angle", "ahead"), [(0.0, 1e-6), (0.6, 1e-8)])
+def test_contact_with_the_tip_removes_noise_along_the_normal(angle, ahead):
     def predict(inputs):
         answer = moving(0.0)(inputs)
-        return replace(answer, covariance=np.tile(np.diag([1e-6, 1e-8, 0.0]), (len(inputs), 1, 1)))
+        return replace(answer, covariance=np.tile(np.diag([ahead, 1e-8, 0.0]), (len(inputs), 1, 1)))
 
-    does = repertoire(predict, SQUARE, np.array([[0.02, 0.125, 0.0]]), (3,))
+    does = repertoire(predict, SQUARE, np.array([[0.02, 0.125, angle]]), (3,))
     assert does.covariance[0, 0, 0] < 1e-15
     np.testing.assert_allclose(does.covariance[0, 1, 1], 3e-8, rtol=1e-6)
 

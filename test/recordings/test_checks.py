@@ -126,7 +126,9 @@ def test_a_slider_that_never_moves_or_has_stamps_in_a_wrong_unit_is_refused(
 ) -> None:
     slider = stamps_scaled(bag(SMALL), unit).slider
     altered = replace(slider, x=factor * slider.x, y=factor * slider.y, heading=factor * slider.heading)
-    assert found(replace(bag(SMALL), slider=altered), rig_of(SMALL))[finding].severity == "refused"
+    refused = found(replace(bag(SMALL), slider=altered), rig_of(SMALL))[finding]
+    assert refused.severity == "refused"
+    assert unit == 1.0 or refused.values["rate"].value == pytest.approx(1e8, rel=0.02)
 
 
 def test_a_rig_in_millimetres_is_refused() -> None:

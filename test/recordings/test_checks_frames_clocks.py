@@ -198,6 +198,15 @@ def test_a_clock_that_was_set_is_named_with_size_and_time(name: str, size: float
     assert f"the {name}'s {'forward' if size > 0.0 else 'back'}" in finding.sentence
 
 
+@pytest.mark.parametrize(("size", "way"), [(0.2, "later"), (-0.2, "earlier")])
+def test_a_clock_that_was_set_bit_by_bit_is_named_without_its_stream(size: float, way: str) -> None:
+    slider = bag(MANY).slider
+    share = np.clip((np.arange(len(slider)) - 0.4 * len(slider)) / 50.0, 0.0, 1.0)
+    stamp = slider.stamp + np.round(1e9 * size * share).astype(np.int64)
+    finding = found(replace(bag(MANY), slider=replace(slider, stamp=stamp)), rig_of(MANY))["clock_step"]
+    assert f"the slider's stamps become {way} against the pusher's" in finding.sentence
+
+
 def test_a_clock_that_was_set_back_is_corrected_from_the_right_sample_on() -> None:
     corrected = clock_stage(Evidence(stepped(bag(MANY), "slider", {0.4: -0.4}), rig_of(MANY))).recording
     np.testing.assert_allclose(corrected.slider.stamp - bag(MANY).slider.stamp, 0.0, atol=5e6)

@@ -146,6 +146,9 @@ def test_samples_of_a_frame_without_connection_are_limited(monkeypatch: pytest.M
     lab.transform("/tf", "cart", "tip", stamps, line(stamps))
     taken(tip, lab.in_order())
     assert (tip.dropped, len(tip.tf.histories["tip"].edge.stamp)) == (150, 100)
+    unread = TransformBuffer("world")
+    put(unread, lab.in_order())
+    assert (unread.dropped, unread.unread) == (150, 100)
 
 
 def test_of_a_silent_frame_only_recent_samples_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -111,9 +111,10 @@ def test_irregularities_of_the_mit_set_are_repaired_and_reported(tmp_path: Path)
     streams["ft_wrench"][20], streams["ft_wrench"][21] = streams["ft_wrench"][21], streams["ft_wrench"][20]
     for row in streams["object_pose"][30:]:
         row[3] += np.pi / 2 + 2 * np.pi
+    streams["object_pose"][29][3] += 0.1  # on the way of the jump
     report = import_source("mit", [_write_mit(tmp_path, streams)], tmp_path / "out")
     recording = read_recording(report.written[0])
-    assert len(recording.pusher) == len(recording.slider) == 50
+    assert (len(recording.pusher), len(recording.slider)) == (50, 49)
     assert np.ptp(np.unwrap(recording.slider.heading)) < 1e-9
     assert any("tip_pose: 1 rows that repeat" in line for line in report.dropped)
     assert any("ft_wrench: 1 rows out of order" in line for line in report.repaired)

@@ -381,6 +381,8 @@ def test_page_accepts_fewer_windows_after_a_correction(tmp_path: Path) -> None:
     text = written(
         tmp_path, replace(trace, held_out=replace(held, after=cut), find_unexplained=lambda: trace.unexplained[:90])
     )
+    assert "With corrected streams the model's negative log density goes from" in text
+    assert worth(replace(trace, held_out=replace(held, after=held.before))) == ""
     assert "on windows cut again" in text and "The motion was not searched" in text
 
 

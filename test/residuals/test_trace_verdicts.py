@@ -174,12 +174,17 @@ def test_force_is_judged_only_where_training_shows_what_it_should_be(monkeypatch
     inputs = data.table.inputs.copy()
     faster = np.isin(data.table.push_id, data.table.pushes[::2])
     inputs[faster, 0] *= 5.0
-    shifted = replace(data, table=replace(data.table, inputs=inputs), recordings=None)
+    shifted = replace(data, table=replace(data.table, inputs=inputs).take(inputs[:, 1] < 0.35), recordings=None)
+    assert Question.of(learnt(), shifted).model is retrained(learnt())
     found_by_channel(monkeypatch)
     searched = "push_predictor.residuals.channel_search.wrench_effects"
     monkeypatch.setattr(searched, lambda table, *_: judged.append(table) or NOTHING_FOUND)
     found = trace(learnt(), shifted)
-    assert "velocity" in [each.covariate for each in found.input_shift]
+    assert [(each.covariate, each.extrapolates) for each in found.input_shift] == [
+        ("velocity", True),
+        ("contact", False),
+    ]
+    assert any("Not tested" in note for note in found.notes)
     assert 0 < len(judged[0]) < len(found.analysis)
     assert judged[0].inputs[:, 0].max() < 2.0 * data.table.inputs[:, 0].max()
 

@@ -121,11 +121,15 @@ def test_windows_of_the_streams_agree_with_the_true_motion(shape: str, surface: 
 
 def test_recorded_pushes_follow_the_plan() -> None:
     plan = PushPlan(np.array([0.1, 0.6]), np.array([0.4, -0.7]), np.array([0.02, 0.05]), np.full(2, 0.012))
-    table = push_outcomes(SimulationSpec("ellip2", "delrin", plan, seed=1))
-    first = table.take(np.unique(table.push_id, return_index=True)[1])
+    spec = SimulationSpec("ellip2", "delrin", plan, seed=1)
+    first, longer = (
+        table.take(np.unique(table.push_id, return_index=True)[1])
+        for table in (push_outcomes(spec, duration) for duration in (0.2, 0.2032))  # the other ends between two steps
+    )
     assert first.inputs[:, 0] == pytest.approx(plan.speed)
     assert first.inputs[:, 1] == pytest.approx(plan.contact, abs=0.002)
     assert first.inputs[:, 2] == pytest.approx(plan.angle, abs=0.01)
+    assert longer.outcomes[:, 0] / 0.2032 == pytest.approx(first.outcomes[:, 0] / 0.2, rel=2e-3)
 
 
 def test_invalid_plan_or_rig_is_rejected_by_name() -> None:
