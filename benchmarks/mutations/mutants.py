@@ -107,15 +107,16 @@ def _by_kind(path: Path) -> dict[str, list[Mutant]]:
 
 def _nodes(node: ast.AST, function: str) -> Iterator[tuple[str, ast.AST]]:
     """All nodes with the qualified name of their function; not annotations, messages of errors and formatted text."""
+    if isinstance(node, (ast.Raise, ast.JoinedStr)):
+        return
     for name, value in ast.iter_fields(node):
-        if name in ("annotation", "returns", "decorator_list", "type_params") or isinstance(
-            node, (ast.Raise, ast.JoinedStr)
-        ):
+        if name in ("annotation", "returns", "decorator_list", "type_params"):
             continue
         for child in value if isinstance(value, list) else [value]:
             if isinstance(child, ast.AST):
-                named = isinstance(child, (ast.FunctionDef, ast.ClassDef))
-                inside = f"{function}.{child.name}".lstrip(".") if named else function  # type: ignore[attr-defined]
+                inside = function
+                if isinstance(child, (ast.FunctionDef, ast.ClassDef)):
+                    inside = f"{function}.{child.name}".lstrip(".")
                 yield inside, child
                 yield from _nodes(child, inside)
 

@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 COLUMNS = ("velocity", "contact", "angle", "duration", "variance_left")
 
 
+def _range_option(flag: str, meaning: str) -> Option:
+    return Option(flag, type=float, nargs=2, metavar=("LOW", "HIGH"), help=meaning)
+
+
 def _model_or_rig(options: argparse.Namespace) -> str:
     return "give either MODEL or --rig FILE.yaml" if (options.model is None) == (options.rig is None) else ""
 
@@ -45,20 +49,8 @@ def _model_or_rig(options: argparse.Namespace) -> str:
     "push_predictor suggest square_abs.pushmodel --count 20 --travel 0.03 --out pushes.csv",
     model_argument("?", note="; give it or --rig"),
     Option("--count", type=int, default=20, metavar="N", help="number of pushes (default %(default)s)"),
-    Option(
-        "--speed-range",
-        type=float,
-        nargs=2,
-        metavar=("LOW", "HIGH"),
-        help="pusher speeds in m/s (default: those of the training pushes)",
-    ),
-    Option(
-        "--angle-range",
-        type=float,
-        nargs=2,
-        metavar=("LOW", "HIGH"),
-        help="push angles in rad (default: ±1, or those of training)",
-    ),
+    _range_option("--speed-range", "pusher speeds in m/s (default: those of the training pushes)"),
+    _range_option("--angle-range", "push angles in rad (default: ±1, or those of training)"),
     TRAVEL,
     Option(
         "--exclude",

@@ -90,7 +90,7 @@ class PushVectorEnv(VectorEnv[Array, Array, Array]):
     Slider k of `reset(seed=s)` behaves exactly as a PushEnv with the seed s + k. The other arguments are PushEnv's.
     """
 
-    metadata = {**PushEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    metadata = {**PushEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as above
 
     def __init__(
         self,

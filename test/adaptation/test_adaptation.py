@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,8 +50,8 @@ def each(table: PushTable) -> list[PushTable]:
     return [table.take(table.push_id == push) for push in table.pushes]
 
 
-def adapted_to(model: PushModel, table: PushTable, *args: object, **options: object) -> Adaptation:
-    adaptation = Adaptation(model, *args, **options)  # type: ignore[arg-type]
+def adapted_to(model: PushModel, table: PushTable, *args: Any, **options: Any) -> Adaptation:
+    adaptation = Adaptation(model, *args, **options)
     for push in each(table):
         adaptation.update(push)
     return adaptation
@@ -225,15 +226,16 @@ def test_what_cannot_follow_is_refused_by_name(deployed: PushModel) -> None:
     learnt = train_model(*square_pushes(30), "gp", name="blind", options=TrainingOptions(mean="zero"))
     with pytest.raises(RequestError, match="model: 'blind' is not accepted, give a model about mechanics"):
         Adaptation(learnt)
-    for options, message in (
+    refused: tuple[tuple[dict[str, Any], str], ...] = (
         ({"mechanisms": ["glue"]}, "mechanisms: .*glue"),
         ({"mechanisms": []}, "mechanisms"),
         ({"mechanisms": ["contact_friction"] * 2}, "each once"),
         ({"speed": -0.1}, "speed: -0.1"),
         ({"speed": np.nan}, "speed: nan"),
-    ):
+    )
+    for options, message in refused:
         with pytest.raises(RequestError, match=message):
-            Adaptation(deployed, **options)  # type: ignore[arg-type]
+            Adaptation(deployed, **options)
     adaptation = Adaptation(deployed)
     for table in (empty_table(), pushes(2, 1)):
         with pytest.raises(RequestError, match="those of one push"):

@@ -44,23 +44,30 @@ class StatusPublisher:
         self._node, self._session, self._writer = node, session, writer
         self._models, self._rigs, self._sensors, self._client = models, rigs, sensors, client
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._news, self._refusals, self._topic_news = News(at_once=True), News(at_once=True), News()
+        self._state_news, self._finding_news = News(at_once=True), News(at_once=True)
+        self._refusals, self._topic_news = News(at_once=True), News()
 
     def publish(self, run: ValidationRun | None) -> None:
         """Publish the status of this moment. run: the present one or the last."""
         self._log_topics()
-        problems = self._problems(run)
-        log = self._node.get_logger()
-        for gone in self._news.gone(problems):
-            log.info(f"no longer: {gone}")
-        for problem in self._news.of(dict.fromkeys(problems, "")):
-            log.warning(problem)
-        status = self._status(run, problems)
+        self._log_problems(run)
+        status = self._status(run, self._problems(run))
         self._publisher.publish(diagnostic_array(self._node.get_clock().now().nanoseconds, status))
 
     def why_nothing(self) -> str:
         """Why there was no run: what is missing of model, rig and samples, in words."""
         return _paragraph(["Nothing was validated", *self._problems(None), *self._sensors.problems()])
+
+    def _log_problems(self, run: ValidationRun | None) -> None:
+        """Log new problems, and which have ended; what was found in a run stays true of it."""
+        log, states, found = self._node.get_logger(), self._states(run), _found(run)
+        for gone in self._state_news.gone(states):
+            log.info(f"no longer: {gone}")
+        for problem in [
+            *self._state_news.of(dict.fromkeys(states, "")),
+            *self._finding_news.of(dict.fromkeys(found, "")),
+        ]:
+            log.warning(problem)
 
     def _log_topics(self) -> None:
         """Log a line for each topic of which something has changed."""
@@ -79,12 +86,14 @@ class StatusPublisher:
                 log.info(report.line)
 
     def _problems(self, run: ValidationRun | None) -> list[str]:
+        return [*self._states(run), *_found(run)]
+
+    def _states(self, run: ValidationRun | None) -> list[str]:
+        """What is wrong now, and may end."""
         unsaved = run.files.failure if run and run.files else ""
         silent = SILENT if self._session.silent(monotonic()) else ""
         found = [*(self._models.problems or [self._models.missing]), self._rigs.problem, unsaved, silent]
-        found += self._client.problems
-        found += [*run.checks.check.problems, *(finding.text for finding in run.coverage or [])] if run else []
-        return [*filter(None, dict.fromkeys(found))]
+        return [*filter(None, dict.fromkeys([*found, *self._client.problems]))]
 
     def _status(self, run: ValidationRun | None, problems: Sequence[str]) -> DiagnosticStatus:
         """ERROR for a failure, a refused topic or refused samples, WARN for a problem."""
@@ -109,6 +118,12 @@ class StatusPublisher:
         if self._writer.report.alive:
             return "writing the report"
         return "validating" if self._session.active else "waiting for samples"
+
+
+def _found(run: ValidationRun | None) -> list[str]:
+    """What the checks found in a run."""
+    found = [*run.checks.check.problems, *(finding.text for finding in run.coverage or [])] if run else []
+    return [*dict.fromkeys(found)]
 
 
 def _paragraph(texts: Sequence[str]) -> str:
